@@ -1,0 +1,7 @@
+#include "cli/command.h"
+
+namespace imprint {
+
+void add_live_commands(Cli& /*cli*/) {}
+
+}  // namespace imprint

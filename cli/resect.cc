@@ -1,0 +1,7 @@
+#include "cli/command.h"
+
+namespace imprint {
+
+void add_resect_command(Cli& /*cli*/) {}
+
+}  // namespace imprint

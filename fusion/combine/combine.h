@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fusion/triangulate/triangulate.h"
+
+namespace imprint {
+
+struct CombineConfig;  // in combine_config.h
+
+/// One cross-section from all observations, in the forging's own frame (contract section 1).
+struct CombinedSection {
+  double s_mm = 0.0;
+  Eigen::Vector3d axis_mm = Eigen::Vector3d::Zero();
+  Eigen::Matrix2d axis_covariance_mm2 = Eigen::Matrix2d::Zero();  ///< of y, z
+  double diameter_mm = 0.0;    ///< mean over directions
+  double diameter_sigma_mm = 0.0;
+  double circularity_mm = 0.0; ///< (largest - smallest width) / 2, [D] 2.1.3
+  double circularity_sigma_mm = 0.0;
+};
+
+/// The forging as all observations together show it, aligned.
+struct CombinedForging {
+  Eigen::Matrix3d R_forging_world = Eigen::Matrix3d::Identity();  ///< for the first observation
+  Eigen::Vector3d origin_world_mm = Eigen::Vector3d::Zero();
+  double length_mm = 0.0;
+  double length_sigma_mm = 0.0;
+  std::vector<CombinedSection> sections;  ///< 500, ascending s
+  std::vector<std::string> warnings;
+};
+
+/// Pre-alignment by the two end sections, best-fit shift with known rotation ([D] eq. 5), mean axis (eq. 6),
+/// sections from all tangents together. `rotations_deg`: one an observation, right-handed about the axis.
+/// Fails (job_failed) when there is no observation, or none long enough to align.
+Result<CombinedForging> combine(std::span<const ObservedForging> observations, std::span<const double> rotations_deg,
+                                const ForgingSpec& forging, const CombineConfig& config);
+
+}  // namespace imprint

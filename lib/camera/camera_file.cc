@@ -1,0 +1,1 @@
+#include "lib/camera/camera_file.h"

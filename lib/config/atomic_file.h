@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+#include "lib/result/result.h"
+
+namespace imprint {
+
+/// Writes the whole file or nothing: to a temporary name in the same folder, flushed, then renamed.
+Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+/// The bytes of a file; the error names it.
+Result<std::string> read_file(const std::filesystem::path& path);
+
+}  // namespace imprint

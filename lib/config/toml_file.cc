@@ -1,0 +1,1 @@
+#include "lib/config/toml_file.h"

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lib/camera/camera_model.h"
+#include "lib/result/result.h"
+#include "lib/targets/target_field.h"
+#include "lib/targets/target_library.h"
+
+namespace imprint {
+
+enum class Polarity { bright, dark };
+
+/// What the cameras of one line look at.
+struct ForgingSpec {
+  double diameter_min_mm = 0.0;
+  double diameter_max_mm = 0.0;
+  Eigen::Vector3d axis_direction_world = Eigen::Vector3d::UnitX();  ///< rough; length 1
+  double end_section_mm = 80.0;  ///< length of the two end sections that define the ideal axis
+  Polarity polarity = Polarity::bright;
+};
+
+/// `rig.toml` with all that it names, read.
+struct Rig {
+  TargetField field;
+  TargetLibrary library;
+  std::vector<CameraModel> cameras;  ///< in the file's order; ids unique
+  ForgingSpec forging;
+
+  [[nodiscard]] const CameraModel* find_camera(std::string_view id) const;
+};
+
+Result<Rig> read_rig(const std::filesystem::path& path);
+
+struct SessionObservation {
+  double rotation_deg = 0.0;  ///< about the forging axis, right-handed about the rig's axis_direction
+  std::map<std::string, std::filesystem::path> images;  ///< by camera id, absolute
+};
+
+/// `session.toml`: one forging, one or more observations.
+struct SessionFile {
+  std::filesystem::path rig;
+  std::vector<SessionObservation> observations;
+};
+
+Result<SessionFile> read_session_file(const std::filesystem::path& path);
+
+}  // namespace imprint

@@ -1,0 +1,1 @@
+#include "lib/rig/rig.h"

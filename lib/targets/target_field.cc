@@ -1,0 +1,1 @@
+#include "lib/targets/target_field.h"

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/result/result.h"
+
+namespace imprint {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// One message as it arrived.
+struct Sample {
+  std::string key;
+  Bytes payload;
+};
+
+/// Called on a thread of the transport: queue the work and return, never block or call the transport from it.
+using SampleCallback = std::function<void(const Sample&)>;
+using MissCallback = std::function<void(std::string_view source, std::uint32_t count)>;
+using LivenessCallback = std::function<void(std::string_view key, bool alive)>;
+
+/// A request that waits for its answer; may be answered later and from any thread, at most once.
+class Query {
+ public:
+  virtual ~Query() = default;
+  [[nodiscard]] virtual std::string key() const = 0;
+  [[nodiscard]] virtual std::string parameters() const = 0;
+  [[nodiscard]] virtual Bytes payload() const = 0;
+  virtual Result<void> reply(std::span<const std::uint8_t> payload) = 0;
+  virtual Result<void> reply_error(std::string_view message) = 0;
+};
+using QueryCallback = std::function<void(std::shared_ptr<Query>)>;
+
+enum class Traffic { imprint, health, command, bulk };  ///< each has its own priority on the link
+
+/// Sends on one key. With `history` the last samples are kept for subscribers that come late or lost some.
+class Publisher {
+ public:
+  virtual ~Publisher() = default;
+  virtual Result<void> put(std::span<const std::uint8_t> payload) = 0;
+};
+
+/// Lives as long as what it stands for (a subscription, a liveliness token, a queryable).
+class Declaration {
+ public:
+  virtual ~Declaration() = default;
+};
+
+struct PublisherOptions {
+  Traffic traffic = Traffic::imprint;
+  std::size_t history = 0;  ///< samples kept for late or lossy subscribers; 0: none
+};
+struct SubscriberOptions {
+  std::size_t history = 0;  ///< samples to ask for on start; recovery of missed ones is on when > 0
+};
+
+/// A connection to the plant's key space. Key expressions as in Zenoh (`*`, `**`).
+class Transport {
+ public:
+  virtual ~Transport() = default;
+  virtual Result<std::unique_ptr<Publisher>> publish(const std::string& key, PublisherOptions options) = 0;
+  virtual Result<std::unique_ptr<Declaration>> subscribe(const std::string& key, SubscriberOptions options,
+                                                         SampleCallback on_sample, MissCallback on_miss = {}) = 0;
+  virtual Result<std::unique_ptr<Declaration>> answer(const std::string& key, QueryCallback on_query) = 0;
+  virtual Result<std::unique_ptr<Declaration>> announce(const std::string& key) = 0;  ///< liveliness token
+  virtual Result<std::unique_ptr<Declaration>> watch_liveness(const std::string& key, LivenessCallback on_change) = 0;
+  /// All replies to a query within the timeout; an error reply is an Error. Blocks: never from a callback.
+  virtual Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
+                                          std::chrono::milliseconds timeout) = 0;
+};
+
+struct ZenohConfig {
+  std::vector<std::string> connect;  ///< endpoints to reach, e.g. "tcp/10.0.0.5:7447"; kept trying for ever
+  std::vector<std::string> listen;   ///< endpoints to open; none by default
+  bool router = false;               ///< route for others (the fusion node)
+};
+
+/// Opens at once and connects when the other side is there.
+Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config);
+
+/// The twin for tests: every transport opened on one bus sees the others, in this process.
+class MemoryBus;
+std::shared_ptr<MemoryBus> make_memory_bus();
+std::unique_ptr<Transport> open_memory(std::shared_ptr<MemoryBus> bus);
+
+}  // namespace imprint

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "lib/imprint/imprint.h"
+#include "lib/result/result.h"
+
+namespace imprint {
+
+/// The protobuf bytes of `imprint.v1.Imprint`: at most 4,096 for 3 x 500 points with weights,
+/// curve points true to 0.002 px.
+std::vector<std::uint8_t> encode_imprint(const Imprint& imprint);
+
+/// Fails (invalid_input) on bytes that are no imprint or carry impossible values; never throws, bounded memory.
+Result<Imprint> decode_imprint(std::span<const std::uint8_t> bytes);
+
+struct Trigger {
+  std::string session;
+  std::uint32_t observation = 0;
+  double rotation_deg = 0.0;
+  std::int64_t fire_at_ns = 0;            ///< sensor time, since the Unix epoch; 0: at once
+  std::uint32_t observations_expected = 0; ///< of this session; 0: not known
+};
+std::vector<std::uint8_t> encode_trigger(const Trigger& trigger);
+Result<Trigger> decode_trigger(std::span<const std::uint8_t> bytes);
+
+struct Health {
+  std::string camera_id;
+  std::int64_t time_ns = 0;
+  std::uint64_t boot_id = 0;
+  std::uint64_t sequence = 0;      ///< of the last imprint
+  std::uint64_t frames = 0;        ///< frames taken since start
+  std::uint64_t failed_frames = 0; ///< of which no imprint could be made
+  int targets_seen = 0;
+  double reprojection_rms_px = 0.0;
+  double contrast = 0.0;
+  std::string last_error;          ///< one line, at most 80 characters; empty when the last frame was good
+  std::string version;
+};
+std::vector<std::uint8_t> encode_health(const Health& health);
+Result<Health> decode_health(std::span<const std::uint8_t> bytes);
+
+/// A `Result` message: the JSON document of `imprint.result/1` with its session and whether it is the last.
+struct ResultMessage {
+  std::string session;
+  bool complete = false;   ///< all expected observations are in, or the session was closed
+  std::string error;       ///< why there is no measurement; empty when there is
+  std::string json;
+};
+std::vector<std::uint8_t> encode_result(const ResultMessage& result);
+Result<ResultMessage> decode_result(std::span<const std::uint8_t> bytes);
+
+}  // namespace imprint

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace imprint {
+
+/// One picture of one camera: one channel, 8 or 16 bit.
+struct Frame {
+  cv::Mat image;
+  std::string source;  ///< file or device, for messages
+  std::int64_t sensor_time_ns = 0;
+  std::uint64_t sequence = 0;
+};
+
+}  // namespace imprint

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lib/result/result.h"
+#include "lib/rig/rig.h"
+
+namespace imprint {
+
+/// What the rig and the pose say about where the forging can be in the observed image.
+struct SegmentPrior {
+  double direction_x = 1.0;        ///< rough axis direction in the observed image, unit vector
+  double direction_y = 0.0;
+  double diameter_min_px = 0.0;    ///< range of the silhouette's width across the axis
+  double diameter_max_px = 0.0;
+  Polarity polarity = Polarity::bright;
+};
+
+struct SegmentConfig;  // in segment_config.h
+
+/// The forging, roughly: a straight line in the observed image and, at every whole px along it,
+/// where the two rims are expected. Coordinates: origin + station direction + offset normal, with the
+/// normal the direction turned by +90 deg from x to y.
+struct Segmentation {
+  ObservedPoint origin;
+  double direction_x = 1.0;
+  double direction_y = 0.0;
+  int first_station_px = 0;            ///< station of the first element of the vectors below
+  std::vector<float> upper_offset_px;  ///< expected rim with the smaller offset; NaN where none was seen
+  std::vector<float> lower_offset_px;
+  double score = 0.0;                  ///< how sure: share of the length with both rims, 0 to 1
+};
+
+/// Finds the one forging that fits the prior, [C] 2.3.2 "Forging segmentation".
+/// Fails (job_failed) when nothing in the image fits, saying what was missing.
+Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& prior, const SegmentConfig& config);
+
+}  // namespace imprint
