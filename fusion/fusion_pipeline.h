@@ -3,20 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "fusion/receive/observation.h"
 #include "fusion/results/measurement.h"
-#include "lib/imprint/imprint.h"
 #include "lib/result/result.h"
 #include "lib/rig/rig.h"
 
 namespace imprint {
-
-/// One observation as it reached fusion: an imprint a camera; cameras that never reported stand in `missing`.
-struct Observation {
-  int index = 0;
-  double rotation_deg = 0.0;
-  std::vector<Imprint> imprints;
-  std::vector<std::pair<std::string, std::string>> missing;  ///< camera id, why
-};
 
 /// The whole fusion: triangulate every observation, combine, evaluate. A pure call.
 /// A camera with a failure or missing is excluded and named in the warnings; fails (job_failed)

@@ -1,11 +1,17 @@
 #include "lib/config/toml_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
 #include "lib/config/atomic_file.h"
 
 namespace imprint {
+namespace {
+
+constexpr std::string_view kOverrideSource = "--set";  // where a value of the command line says it comes from
+
+}  // namespace
 
 Result<toml::table> parse_toml_file(const std::filesystem::path& path) {
   const auto text = read_file(path);
@@ -28,7 +34,8 @@ void TomlReader::fault(std::string_view key, std::string_view message) {
   if (error_) return;  // the first fault is the one to mend first
   const toml::node* node = find(key);
   const auto line = node != nullptr ? node->source().begin.line : table_.source().begin.line;
-  const std::string place = line > 0 ? fmt::format("{}:{}", path_.string(), line) : path_.string();
+  const bool from_command_line = node != nullptr && node->source().path && *node->source().path == kOverrideSource;
+  const std::string place = from_command_line ? std::string(kOverrideSource) : line > 0 ? fmt::format("{}:{}", path_.string(), line) : path_.string();
   error_ = Error{ErrorKind::invalid_input, fmt::format("{}: {}{}: {}", place, prefix_, key, message)};
 }
 
@@ -88,6 +95,22 @@ std::vector<double> TomlReader::numbers(std::string_view key, std::size_t count,
   return values;
 }
 
+std::vector<std::string> TomlReader::strings(std::string_view key, std::optional<std::vector<std::string>> fallback) {
+  const toml::node* node = find(key);
+  if (node == nullptr && fallback) return *fallback;
+  std::vector<std::string> values;
+  const toml::array* array = node != nullptr ? node->as_array() : nullptr;
+  bool valid = array != nullptr;
+  if (valid) {
+    for (const toml::node& element : *array) {
+      valid = valid && element.is_string();
+      if (valid) values.push_back(element.as_string()->get());
+    }
+  }
+  if (!valid) fault(key, node == nullptr ? "missing, expected a list of texts" : "expected a list of texts");
+  return valid ? values : std::vector<std::string>{};
+}
+
 std::filesystem::path TomlReader::path(std::string_view key, std::optional<std::filesystem::path> fallback) {
   if (!has(key) && fallback) return *fallback;
   const std::string text = string(key);
@@ -112,6 +135,21 @@ std::vector<const toml::table*> TomlReader::tables(std::string_view key) {
   return result;
 }
 
+void TomlReader::only(std::initializer_list<std::string_view> known) {
+  for (const auto& [section, node] : table_) {
+    if (!node.is_table()) {
+      fault(section.str(), "unknown key; every key of this file stands in a [section]");
+      continue;
+    }
+    for (const auto& [key, value] : *node.as_table()) {
+      const std::string full = fmt::format("{}.{}", section.str(), key.str());
+      if (std::ranges::find(known, full) == known.end()) {
+        fault(full, fmt::format("unknown key, expected one of {}", fmt::join(known, ", ")));
+      }
+    }
+  }
+}
+
 Result<void> apply_override(toml::table& table, std::string_view assignment) {
   const auto equals = assignment.find('=');
   const auto dot = assignment.find('.');
@@ -123,7 +161,7 @@ Result<void> apply_override(toml::table& table, std::string_view assignment) {
   const std::string value(assignment.substr(equals + 1));
   toml::table parsed;
   try {
-    parsed = toml::parse("value = " + value);
+    parsed = toml::parse("value = " + value, kOverrideSource);
   } catch (const toml::parse_error&) {
     parsed.insert("value", value);  // a bare word is a text
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,11 +31,15 @@ class TomlReader {
   bool boolean(std::string_view key, std::optional<bool> fallback = std::nullopt);
   /// `count` numbers; 0 takes any count.
   std::vector<double> numbers(std::string_view key, std::size_t count, std::optional<std::vector<double>> fallback = std::nullopt);
+  /// A list of texts.
+  std::vector<std::string> strings(std::string_view key, std::optional<std::vector<std::string>> fallback = std::nullopt);
   /// A path, made absolute against the file's folder.
   std::filesystem::path path(std::string_view key, std::optional<std::filesystem::path> fallback = std::nullopt);
   /// The tables of an array of tables (`[[camera]]`); empty when the key is absent.
   std::vector<const toml::table*> tables(std::string_view key);
   [[nodiscard]] bool has(std::string_view key) const;
+  /// Faults every `section.key` that is not among `known`: a mistyped key must not be a default unnoticed.
+  void only(std::initializer_list<std::string_view> known);
 
   /// Notes a fault of one key: "<file>:<line>: <prefix><key>: <message>".
   void fault(std::string_view key, std::string_view message);

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lib/imprint/imprint.h"
+
+namespace imprint {
+
+/// One observation as it reached fusion: an imprint a camera; cameras that never reported stand in `missing`.
+struct Observation {
+  int index = 0;
+  double rotation_deg = 0.0;
+  std::vector<Imprint> imprints;
+  std::vector<std::pair<std::string, std::string>> missing;  ///< camera id, why
+};
+
+}  // namespace imprint

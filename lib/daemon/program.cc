@@ -1,0 +1,79 @@
+#include "lib/daemon/program.h"
+
+#include <algorithm>
+#include <iostream>
+#include <regex>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+namespace imprint {
+
+std::optional<int> parse_program_options(int argc, char** argv, const std::string& name, const std::string& purpose,
+                                         ProgramOptions& options) {
+  CLI::App app{purpose, name};
+  app.set_version_flag("--version", IMPRINT_VERSION);
+  app.add_option("--config", options.config, "the config file (TOML)")->required();
+  app.add_flag("--check", options.check, "check the config and all it names, then stop");
+  app.add_flag("--print-config", options.print_config, "print the config with its defaults, then stop");
+  // One value each: `--set a.b=1 c.d=2` would otherwise swallow a forgotten --set.
+  app.add_option("--set", options.overrides, "override one key: section.key=value")->expected(1)->take_all();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return std::nullopt;
+}
+
+Result<toml::table> read_program_config(const ProgramOptions& options) {
+  auto table = parse_toml_file(options.config);
+  if (!table) return table;
+  for (const std::string& assignment : options.overrides) {
+    if (auto done = apply_override(*table, assignment); !done) return pass_on(done.error());
+  }
+  return table;
+}
+
+bool is_plain_name(std::string_view name) {
+  return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+  });
+}
+
+std::string read_plain_name(TomlReader& read, std::string_view key, std::optional<std::string> fallback) {
+  std::string name = read.string(key, std::move(fallback));
+  if (!read.error() && !is_plain_name(name)) {
+    read.fault(key, fmt::format("expected 1 to 64 letters, digits, '_', '-' or '.', found \"{}\"", name));
+  }
+  return name;
+}
+
+ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults) {
+  static const std::regex endpoint("(tcp|udp|tls)/[^\\s/]+:[0-9]{1,5}(\\?.*)?(#.*)?");
+  ZenohConfig config = defaults;
+  config.connect = read.strings("zenoh.connect", defaults.connect);
+  config.listen = read.strings("zenoh.listen", defaults.listen);
+  for (const auto& [key, endpoints] : {std::pair{"zenoh.connect", &config.connect}, {"zenoh.listen", &config.listen}}) {
+    for (const std::string& text : *endpoints) {
+      if (!std::regex_match(text, endpoint)) {
+        read.fault(key, fmt::format("expected endpoints like \"tcp/127.0.0.1:7447\", found \"{}\"", text));
+      }
+    }
+  }
+  return config;
+}
+
+std::string toml_text(std::string_view text) {
+  std::ostringstream out;
+  out << toml::value<std::string>(std::string(text));
+  return out.str();
+}
+
+std::string toml_list(const std::vector<std::string>& texts) {
+  std::string list = "[";
+  for (const std::string& text : texts) list += (list.size() > 1 ? ", " : "") + toml_text(text);
+  return list + "]";
+}
+
+}  // namespace imprint
