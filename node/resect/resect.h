@@ -11,9 +11,10 @@
 namespace imprint {
 
 struct ResectConfig {
-  double max_residual_px = 3.0;   // a target off by more than this is never used; ours
-  double robust_scale_px = 0.1;   // Cauchy scale of the reprojection residual; ours
-  int min_targets = 4;            // 6 unknowns need 3 points; one more lets a wrong one show; ours
+  int min_targets = 4;           // 3 points give a pose but cannot contradict it; ours
+  double max_residual_px = 3.0;  // a target further off is taken for a wrong id; ours
+  double noise_floor_px = 0.05;  // added to each target's sigma: air and lens residuals, [B] 3.3; ours
+  double reject_sigmas = 4.0;    // a target is left out beyond this many robust standard deviations; ours
 
   [[nodiscard]] Result<void> validate() const;
 };
@@ -32,8 +33,9 @@ struct Resection {
   std::vector<int> unknown_ids;  ///< detected, but not in the field
 };
 
-/// The camera's pose with its covariance, from one image: start values by direct linear transformation or
-/// a minimal solution, then trust-region on the robust reprojection error, [B] 2.4 and equation 1.
+/// The camera's pose with its covariance, from one image: start by consensus of minimal solutions, then
+/// Levenberg-Marquardt on the robust reprojection error, [B] 2.4 and equation 1. The covariance is that of
+/// the adjustment, scaled up (never down) by the residuals found.
 /// Fails (job_failed) with fewer than `min_targets` usable targets, naming those it has.
 Result<Resection> resect(const CameraModel& camera, const std::vector<DetectedTarget>& detected,
                          const TargetField& field, const ResectConfig& config);

@@ -1,0 +1,154 @@
+#include "node/resect/resect.h"
+
+#include <random>
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+
+using namespace imprint;
+using Catch::Matchers::Contains;
+
+namespace {
+
+// A camera and a field as in [B]: 6 x 6 x 2 m seen from about 9 m.
+struct Setup {
+  CameraModel camera;
+  CameraPose pose;
+  TargetField field;
+
+  explicit Setup(int targets, unsigned seed = 1) {
+    camera.id = "cam1";
+    camera.width_px = 4656;
+    camera.height_px = 3520;
+    camera.focal_length_px = 5722.79;
+    camera.principal_point = {2367.8, 1736.88};
+    camera.distortion.radial = {-6.3e-3, 5.2e-4, 1.3e-5};
+    pose.R_cam_world = rotation_from_omega_phi_kappa({3.83, 0.014, 3.07}).transpose();
+    pose.center_world_mm = {-553.64, -5503.11, 6996.44};
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> x(-0.38, 0.38), y(-0.28, 0.28), depth(7500, 10500);
+    for (int id = 1; id <= targets; ++id) {
+      const double z = depth(random);
+      const Eigen::Vector3d p_cam(x(random) * z, y(random) * z, z);
+      field.targets[id].p_world_mm = pose.R_cam_world.transpose() * p_cam + pose.center_world_mm;
+    }
+  }
+
+  std::vector<DetectedTarget> detect(double noise_px, unsigned seed) const {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    std::vector<DetectedTarget> detected;
+    for (const auto& [id, target] : field.targets) {
+      ObservedPoint p = project(camera, pose.cam_from_world(target.p_world_mm));
+      p.x_px += noise_px * noise(random);
+      p.y_px += noise_px * noise(random);
+      detected.push_back({id, p, noise_px, 20.0, 0.0});
+    }
+    return detected;
+  }
+};
+
+ResectConfig exact_config(double noise_floor_px) {
+  ResectConfig config;
+  config.noise_floor_px = noise_floor_px;
+  return config;
+}
+
+}  // namespace
+
+TEST_CASE("resect: without noise the pose comes back") {
+  for (const int targets : {4, 8, 20}) {
+    const Setup setup(targets);
+    const auto result = resect(setup.camera, setup.detect(0.0, 1), setup.field, ResectConfig{});
+    REQUIRE(result);
+    CHECK((result->pose.center_world_mm - setup.pose.center_world_mm).norm() < 1e-5);  // rounding
+    CHECK((result->pose.R_cam_world - setup.pose.R_cam_world).norm() < 1e-9);
+    CHECK(result->reprojection_rms_px < 1e-6);
+  }
+}
+
+TEST_CASE("resect: 8 targets of 0.03 px give the centre within 0.3 mm at 9 m, median over fields") {
+  std::vector<double> errors;
+  for (unsigned seed = 1; seed <= 41; ++seed) {
+    const Setup setup(8, seed);
+    const auto result = resect(setup.camera, setup.detect(0.03, seed), setup.field, exact_config(0.01));
+    REQUIRE(result);
+    errors.push_back((result->pose.center_world_mm - setup.pose.center_world_mm).norm());
+  }
+  std::nth_element(errors.begin(), errors.begin() + 20, errors.end());
+  CHECK(errors[20] < 0.3);
+}
+
+TEST_CASE("resect: three targets is an error that names them, not a pose") {
+  const Setup setup(3);
+  const auto result = resect(setup.camera, setup.detect(0.0, 1), setup.field, ResectConfig{});
+  REQUIRE(!result);
+  CHECK(result.error().exit_status() == 1);
+  CHECK_THAT(result.error().message, Contains("cam1") && Contains("1, 2, 3") && Contains("at least 4"));
+}
+
+TEST_CASE("resect: ids that are not in the field are listed, not used") {
+  Setup setup(12);
+  const auto detected = setup.detect(0.02, 1);
+  setup.field.targets.erase(5);
+  const auto result = resect(setup.camera, detected, setup.field, ResectConfig{});
+  REQUIRE(result);
+  CHECK(result->unknown_ids == std::vector<int>{5});
+  CHECK(result->targets.size() == 11);
+}
+
+TEST_CASE("resect: with 30 % of the ids wrong the pose is the same and the wrong ones are marked") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Setup setup(20, seed);
+    auto detected = setup.detect(0.02, seed);
+    for (std::size_t i = 0; i < 5; ++i) std::swap(detected[i].center, detected[i + 1].center);
+    const auto result = resect(setup.camera, detected, setup.field, ResectConfig{});
+    REQUIRE(result);
+    CHECK((result->pose.center_world_mm - setup.pose.center_world_mm).norm() < 1.0);  // 14 good targets of 0.02 px
+    for (const ResectedTarget& target : result->targets) CHECK(target.used == (target.id > 6));
+  }
+}
+
+TEST_CASE("resect: one target displaced by a third of a pixel is left out") {
+  const Setup setup(20);
+  auto detected = setup.detect(0.02, 3);
+  detected[7].center.x_px += 0.35;
+  const auto result = resect(setup.camera, detected, setup.field, ResectConfig{});
+  REQUIRE(result);
+  CHECK(!result->targets[7].used);
+  CHECK(result->targets[7].dx_px == Approx(0.35).margin(0.1));  // its own noise and the pose's
+}
+
+TEST_CASE("resect: targets that contradict each other give no pose") {
+  const Setup setup(8), other(8, 99);
+  const auto result = resect(setup.camera, setup.detect(0.0, 1), other.field, ResectConfig{});
+  REQUIRE(!result);
+  CHECK(result.error().exit_status() == 1);
+}
+
+TEST_CASE("resect: the covariance is honest: the mean normalised squared error of 300 poses is near 6") {
+  double sum = 0.0;
+  const int repetitions = 300;
+  for (int i = 0; i < repetitions; ++i) {
+    const Setup setup(20, 7);
+    const auto result =
+        resect(setup.camera, setup.detect(0.05, 1000 + static_cast<unsigned>(i)), setup.field, exact_config(0.001));
+    REQUIRE(result);
+    Vector6d error;
+    error.head<3>() = result->pose.center_world_mm - setup.pose.center_world_mm;
+    const Eigen::Matrix3d turn = result->pose.R_cam_world * setup.pose.R_cam_world.transpose();
+    error.tail<3>() = 0.5 * Eigen::Vector3d(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
+    sum += error.dot(result->pose.covariance.ldlt().solve(error));
+  }
+  const double mean =
+      sum / repetitions;  // chi squared with 6 degrees of freedom; the scale is at least 1, so a little below
+  CHECK(mean > 4.0);
+  CHECK(mean < 7.5);
+}
+
+TEST_CASE("resect: targets on one line do not give a pose") {
+  Setup setup(8);
+  for (auto& [id, target] : setup.field.targets) target.p_world_mm = Eigen::Vector3d(100.0 * id, 0.0, 500.0);
+  const auto result = resect(setup.camera, setup.detect(0.0, 1), setup.field, ResectConfig{});
+  CHECK(!result);
+}
