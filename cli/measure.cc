@@ -1,7 +1,100 @@
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/core.h>
+
 #include "cli/command.h"
+#include "cli/result_table.h"
+#include "fusion/fusion_pipeline.h"
+#include "lib/config/atomic_file.h"
+#include "node/capture/image_file.h"
+#include "node/node_pipeline.h"
 
 namespace imprint {
+namespace {
 
-void add_measure_command(Cli& /*cli*/) {}
+struct MeasureOptions {
+  std::filesystem::path session;
+  std::filesystem::path out;
+  std::string method = "best";
+};
+
+// One picture through the node's stages. A picture that cannot be read, or of the wrong size, ends the
+// measurement; one in which nothing can be found only loses its camera.
+Result<Imprint> imprint_of(const std::filesystem::path& file, const CameraModel& camera, const Rig& rig,
+                           EdgeMethod method) {
+  std::vector<std::string> warnings;
+  const auto frame = read_image(file, &warnings);
+  if (!frame) return pass_on(frame.error());
+  ProcessedFrame processed = process_frame(*frame, camera, rig, method);
+  if (processed.error && processed.error->kind == ErrorKind::invalid_input) return pass_on(*processed.error);
+  processed.imprint.warnings.insert(processed.imprint.warnings.begin(), warnings.begin(), warnings.end());
+  return std::move(processed.imprint);
+}
+
+Result<Observation> observe(const SessionObservation& files, int index, const std::filesystem::path& session,
+                            const Rig& rig, EdgeMethod method) {
+  Observation observation{index, files.rotation_deg, {}, {}};
+  for (const auto& [id, file] : files.images) {
+    if (rig.find_camera(id) == nullptr) {
+      return invalid_input("{}: observation {}: camera \"{}\" is not in the rig", session.string(), index, id);
+    }
+  }
+  for (const CameraModel& camera : rig.cameras) {
+    const auto file = files.images.find(camera.id);
+    if (file == files.images.end()) {
+      observation.missing.emplace_back(camera.id, "the session names no image of it");
+      continue;
+    }
+    auto imprint = imprint_of(file->second, camera, rig, method);
+    if (!imprint) return pass_on(imprint.error());
+    imprint->observation = static_cast<std::uint32_t>(index);
+    imprint->rotation_deg = files.rotation_deg;
+    observation.imprints.push_back(std::move(*imprint));
+  }
+  return observation;
+}
+
+Result<Measurement> measure(const MeasureOptions& options) {
+  const auto method = edge_method_from_name(options.method);
+  if (!method) return pass_on(method.error());
+  const auto session = read_session_file(options.session);
+  if (!session) return pass_on(session.error());
+  const auto rig = read_rig(session->rig);
+  if (!rig) return pass_on(rig.error());
+  std::vector<Observation> observations;
+  for (const SessionObservation& files : session->observations) {
+    auto observation = observe(files, static_cast<int>(observations.size()), options.session, *rig, *method);
+    if (!observation) return pass_on(observation.error());
+    observations.push_back(std::move(*observation));
+  }
+  return fuse(observations, rig->forging, options.session.stem().string(), options.method);
+}
+
+int run_measure(const MeasureOptions& options, bool json) {
+  const auto measurement = measure(options);
+  if (!measurement) return fail(measurement.error());
+  for (const std::string& warning : measurement->warnings) std::cerr << "imprint: warning: " << warning << '\n';
+  const auto document = to_json(*measurement);
+  if (!options.out.empty()) {
+    if (auto written = write_file_atomically(options.out, document.dump(1) + "\n"); !written)
+      return fail(written.error());
+  }
+  if (json) return print_json(document);
+  std::cout << result_table(*measurement);
+  return 0;
+}
+
+}  // namespace
+
+void add_measure_command(Cli& cli) {
+  auto options = std::make_shared<MeasureOptions>();
+  auto* command = cli.command(cli.app, "measure", "the whole measurement, from the images of a session to the geometry",
+                              [options, &cli] { return run_measure(*options, cli.json); });
+  command->add_option("session", options->session, "session.toml")->required();
+  command->add_option("--method", options->method, "best, orientation, magnitude, combined, uniform, none or pixel")
+      ->capture_default_str();
+  command->add_option("--out", options->out, "write result.json here");
+}
 
 }  // namespace imprint

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "cli/truth_comparison.h"
+#include "fusion/results/measurement.h"
+
+namespace imprint {
+
+/// The result for a person at a terminal; with `truth`, the truth and the errors stand beside it.
+std::string result_table(const Measurement& measurement, const TruthComparison* truth = nullptr);
+
+}  // namespace imprint

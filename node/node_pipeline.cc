@@ -1,0 +1,109 @@
+#include "node/node_pipeline.h"
+
+#include <cmath>
+
+#include "node/detect/detect_config.h"
+#include "node/edge/edge_config.h"
+#include "node/imprint/filter_config.h"
+#include "node/segment/segment_config.h"
+#include "node/segment/segment_prior.h"
+
+namespace imprint {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Runs one stage and notes how long it took.
+template <class Stage>
+auto timed(ProcessedFrame& frame, const char* name, Stage stage) {
+  const auto start = Clock::now();
+  auto result = stage();
+  frame.stage_times.emplace_back(name, std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start));
+  return result;
+}
+
+ProcessedFrame& give_up(ProcessedFrame& frame, Error error) {
+  frame.imprint.failure = error.message;
+  frame.error = std::move(error);
+  return frame;
+}
+
+Result<void> check_size(const Frame& frame, const CameraModel& camera) {
+  if (frame.image.cols == camera.width_px && frame.image.rows == camera.height_px) return {};
+  return invalid_input("{}: is {} x {} px, but the calibration of camera \"{}\" is for {} x {} px", frame.source,
+                       frame.image.cols, frame.image.rows, camera.id, camera.width_px, camera.height_px);
+}
+
+void note_resection(const Resection& resection, Imprint& imprint) {
+  imprint.pose = resection.pose;
+  imprint.quality.reprojection_rms_px = resection.reprojection_rms_px;
+  for (const ResectedTarget& target : resection.targets) imprint.quality.targets_used += target.used ? 1 : 0;
+  for (const int id : resection.unknown_ids) {
+    imprint.warnings.push_back(fmt::format("camera \"{}\": target {} is not in the field", imprint.camera_id, id));
+  }
+}
+
+void note_silhouette(const Silhouette& silhouette, Imprint& imprint) {
+  imprint.quality.edge_points = static_cast<int>(silhouette.upper.size() + silhouette.lower.size());
+  imprint.quality.contrast = silhouette.contrast;
+  imprint.quality.saturated_fraction = silhouette.saturated_fraction;
+}
+
+void note_coverage(Imprint& imprint) {
+  std::size_t trusted = 0;
+  for (std::size_t i = 0; i < imprint.upper.weight.size(); ++i) {
+    trusted += imprint.upper.weight[i] > 0 && imprint.lower.weight[i] > 0 ? 1 : 0;
+  }
+  imprint.quality.edge_coverage = static_cast<double>(trusted) / static_cast<double>(kImprintStations);
+}
+
+}  // namespace
+
+ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, const Rig& rig, EdgeMethod method) {
+  ProcessedFrame result;
+  Imprint& imprint = result.imprint;
+  imprint.camera_id = camera.id;
+  imprint.sensor_time_ns = frame.sensor_time_ns;
+  imprint.focal_length_px = camera.focal_length_px;
+  imprint.method = edge_method_name(method);
+  if (auto size = check_size(frame, camera); !size) return give_up(result, size.error());
+
+  result.targets = timed(result, "detect", [&] { return detect_targets(frame.image, rig.library, DetectConfig{}); });
+  imprint.quality.targets_seen = static_cast<int>(result.targets.size());
+
+  auto resection = timed(result, "resect", [&] { return resect(camera, result.targets, rig.field, ResectConfig{}); });
+  if (!resection) {
+    return give_up(result, {resection.error().kind, fmt::format("{}: {}", frame.source, resection.error().message)});
+  }
+  note_resection(*resection, imprint);
+  result.resection = std::move(*resection);
+
+  const auto segmentation = timed(result, "segment", [&] {
+    const auto prior = make_segment_prior(camera, imprint.pose, rig.forging, rig.field);
+    return segment_forging(frame.image, prior, SegmentConfig{});
+  });
+  if (!segmentation) {
+    return give_up(result, {segmentation.error().kind, fmt::format("{}: camera \"{}\": {}", frame.source, camera.id,
+                                                                   segmentation.error().message)});
+  }
+
+  const auto silhouette = timed(result, "edge", [&] {
+    return locate_edges(frame.image, *segmentation, rig.forging.polarity, method, EdgeConfig{});
+  });
+  note_silhouette(silhouette, imprint);
+
+  const auto filled = timed(result, "imprint", [&]() -> Result<void> {
+    auto filtered = filter_silhouette(silhouette, method, FilterConfig{});
+    if (!filtered) return pass_on(filtered.error());
+    result.silhouette = std::move(*filtered);
+    return fill_curves(*result.silhouette, camera, imprint);
+  });
+  if (!filled) {
+    return give_up(result, {filled.error().kind,
+                            fmt::format("{}: camera \"{}\": {}", frame.source, camera.id, filled.error().message)});
+  }
+  note_coverage(imprint);
+  return result;
+}
+
+}  // namespace imprint
