@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""./dev bench [stages|accuracy]: what the node costs and how near the truth the measurement comes.
+
+stages    renders one frame of the forge scene; prints the time of every stage beside cv::Canny, and of the renderer.
+accuracy  renders and measures several seeds of both scenes; prints the errors against the truth.
+"""
+import argparse
+import json
+import pathlib
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+BUILD = ROOT / "build"
+IMPRINT = BUILD / "bin" / "imprint"
+SCENES = ROOT / "simulation" / "scenes"
+
+
+def run(*command):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, command))}: exit status {done.returncode}\n{done.stderr}")
+    return done.stdout
+
+
+def simulate(scene, folder, seed, observations, jobs):
+    run(IMPRINT, "simulate", SCENES / f"{scene}.toml", "--seed", seed, "--observations", observations, "--jobs", jobs, "--out", folder)
+
+
+def bench_stages(folder, _):
+    begin = time.monotonic()
+    simulate("forge", folder, 1, 1, 1)
+    user = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    frames = 3
+    print(run(BUILD / "tests" / "bench" / "node_bench", folder / "rig.toml", "cam1", folder / "obs00_cam1.png"), end="")
+    print(f"renderer: {user / frames:.2f} s of one core a frame ({(time.monotonic() - begin) / frames:.2f} s by the clock), PNG included")
+
+
+def bench_accuracy(folder, options):
+    rows = []
+    for scene, observations in (("forge", 1), ("forge", 3), ("laboratory", 1)):
+        for seed in range(options.first_seed, options.first_seed + options.seeds):
+            shutil.rmtree(folder, ignore_errors=True)
+            simulate(scene, folder, seed, observations, 2)
+            run(IMPRINT, "measure", folder / "session.toml", "--out", folder / "result.json")
+            report = json.loads(run(IMPRINT, "report", folder / "result.json", "--truth", folder / "truth.json", "--json"))
+            rows.append((scene, observations, seed, report))
+            print_row(scene, observations, str(seed), {**report["against_truth"], "length_error_mm": report["length_error_mm"]})
+        mine = [row[3] for row in rows if row[:2] == (scene, observations)]
+        worst = {key: max(abs(row["against_truth"][key]) for row in mine) for key in mine[0]["against_truth"]}
+        for key in ("axis_covered", "diameter_covered", "circularity_covered"):
+            worst[key] = statistics.mean(row["against_truth"][key] for row in mine)
+        worst["length_error_mm"] = max((row["length_error_mm"] for row in mine), key=abs)
+        print_row(scene, observations, "worst", worst)
+
+
+def print_row(scene, observations, seed, values):
+    print(f"{scene:<10} {observations} obs  seed {seed:>5}: axis RMS {values['axis_rms_mm']:.3f} mm, "
+          f"diameter RMS {values['diameter_rms_mm']:.3f} mm (best 90 %: {values['diameter_rms_best90_mm']:.3f}), "
+          f"length {values['length_error_mm']:+.3f} mm, circularity RMS {values['circularity_rms_mm']:.3f} mm, "
+          f"95 % intervals hold {100 * values['axis_covered']:.0f} / {100 * values['diameter_covered']:.0f} / "
+          f"{100 * values['circularity_covered']:.0f} %", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", nargs="?", choices=["stages", "accuracy"], help="default: both")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--first-seed", type=int, default=101)
+    options = parser.parse_args()
+    for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
+        if options.name in (None, name):
+            print(f"== {name}")
+            with tempfile.TemporaryDirectory(prefix="imprint-bench-") as folder:
+                bench(pathlib.Path(folder) / "session", options)
+
+
+if __name__ == "__main__":
+    main()
