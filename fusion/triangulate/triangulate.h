@@ -23,6 +23,16 @@ struct TangentPlane {
   double weight = 1.0;       ///< 0 to 1, from the imprint
   int camera = 0;            ///< index into `cameras` of the observation
   bool upper = false;        ///< which rim of that camera
+  double s_mm = 0.0;         ///< where along the observation's straight line the plane touches
+  Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();  ///< from the camera's centre to the rim point, length 1
+};
+
+/// Where one camera saw the outline of one end furthest out, near the axis: a ray to the end's circle.
+struct EndReading {
+  int camera = 0;     ///< index into `cameras` of the observation
+  bool last = false;  ///< the end with the larger coordinate along the axis
+  Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();
+  double sigma_mm = 0.0;  ///< along the axis, of the reading alone
 };
 
 /// One cross-section of one observation.
@@ -47,6 +57,9 @@ struct ObservedForging {
   Eigen::Vector3d start_world_mm = Eigen::Vector3d::Zero();  ///< axis point at the first end
   Eigen::Vector3d end_world_mm = Eigen::Vector3d::Zero();
   double length_sigma_mm = 0.0;
+  double radius_mm = 0.0;             ///< median of the sections
+  std::vector<EndReading> ends;
+  double disagreement_sigma_mm = 0.0; ///< of a camera's place across the axis, where cameras contradict each other
   std::vector<ObservedSection> sections;
   std::vector<CameraShare> cameras;
   std::vector<std::string> warnings;
