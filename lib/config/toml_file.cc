@@ -136,6 +136,8 @@ std::vector<const toml::table*> TomlReader::tables(std::string_view key) {
 }
 
 void TomlReader::only(std::initializer_list<std::string_view> known) {
+  std::string expected;
+  for (const std::string_view key : known) expected.append(expected.empty() ? "" : ", ").append(key);
   for (const auto& [section, node] : table_) {
     if (!node.is_table()) {
       fault(section.str(), "unknown key; every key of this file stands in a [section]");
@@ -144,7 +146,7 @@ void TomlReader::only(std::initializer_list<std::string_view> known) {
     for (const auto& [key, value] : *node.as_table()) {
       const std::string full = fmt::format("{}.{}", section.str(), key.str());
       if (std::ranges::find(known, full) == known.end()) {
-        fault(full, fmt::format("unknown key, expected one of {}", fmt::join(known, ", ")));
+        fault(full, "unknown key, expected one of " + expected);
       }
     }
   }

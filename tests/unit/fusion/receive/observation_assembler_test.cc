@@ -222,7 +222,7 @@ TEST_CASE("receive: any order of arrival gives the same observations") {
       REQUIRE(observations[o].index == static_cast<int>(o));
       REQUIRE(observations[o].imprints.size() == 3);
       for (std::size_t c = 0; c < 3; ++c) {
-        REQUIRE(observations[o].imprints[c].camera_id == "cam" + std::to_string(c + 1));
+        REQUIRE(observations[o].imprints[c].camera_id == fmt::format("cam{}", c + 1));
         REQUIRE(observations[o].imprints[c].observation == o);
       }
     }
@@ -260,7 +260,7 @@ TEST_CASE("receive: memory stays bounded, a session still open outlives the sett
   auto assembler = three_cameras(4);
   REQUIRE(assembler.add(trigger(0, 0.0, 1, "open"), after(0)));
   for (int i = 0; i < 100; ++i) {
-    const std::string name = "S" + std::to_string(i);
+    const std::string name = fmt::format("S{}", i);
     for (const char* camera : {"cam1", "cam2", "cam3"}) assembler.add(answer(camera, 0, 0.0, 1, 1, name), after(0.01 * i));
     REQUIRE(assembler.settle(after(0.01 * i)).size() == 1);
     REQUIRE(assembler.sessions().size() <= 4);
