@@ -36,7 +36,7 @@ Result<toml::table> read_program_config(const ProgramOptions& options) {
 }
 
 bool is_plain_name(std::string_view name) {
-  return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, [](unsigned char c) {
+  return !name.empty() && name.size() <= 64 && name.front() != '.' && std::ranges::all_of(name, [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
   });
 }
@@ -44,7 +44,7 @@ bool is_plain_name(std::string_view name) {
 std::string read_plain_name(TomlReader& read, std::string_view key, std::optional<std::string> fallback) {
   std::string name = read.string(key, std::move(fallback));
   if (!read.error() && !is_plain_name(name)) {
-    read.fault(key, fmt::format("expected 1 to 64 letters, digits, '_', '-' or '.', found \"{}\"", name));
+    read.fault(key, fmt::format("expected 1 to 64 letters, digits, '_', '-' or '.' (not first), found \"{}\"", name));
   }
   return name;
 }

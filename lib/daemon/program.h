@@ -27,7 +27,8 @@ std::optional<int> parse_program_options(int argc, char** argv, const std::strin
 /// The config file with `--set` applied over it.
 Result<toml::table> read_program_config(const ProgramOptions& options);
 
-/// `site`, `line` and camera ids become chunks of keys and parts of file names: letters, digits, '_', '-', '.'.
+/// Sites, lines, cameras and sessions become chunks of keys and names of files: 1 to 64 letters, digits, '_', '-' or
+/// '.', the last not first.
 bool is_plain_name(std::string_view name);
 std::string read_plain_name(TomlReader& read, std::string_view key, std::optional<std::string> fallback);
 

@@ -1,0 +1,240 @@
+#include "fusion/store/session_store.h"
+
+#include <mutex>
+#include <utility>
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+namespace imprint {
+namespace {
+
+constexpr int kSchemaVersion = 1;
+constexpr int kBusyTimeoutMs = 2000;  // another process reading (a report, a backup) may hold the file for a moment
+
+constexpr const char* kSchema = R"sql(
+CREATE TABLE message (
+  id INTEGER PRIMARY KEY,            -- the order of receipt
+  session TEXT NOT NULL,
+  observation INTEGER NOT NULL,
+  received_ns INTEGER NOT NULL,
+  camera TEXT,                       -- NULL: a trigger
+  boot_id INTEGER,
+  sequence INTEGER,
+  bytes BLOB NOT NULL
+);
+CREATE INDEX message_session ON message(session, id);
+CREATE UNIQUE INDEX one_imprint ON message(camera, boot_id, sequence) WHERE camera IS NOT NULL;
+CREATE UNIQUE INDEX one_trigger ON message(session, observation, bytes) WHERE camera IS NULL;
+CREATE TABLE result (
+  session TEXT PRIMARY KEY,
+  complete INTEGER NOT NULL,
+  error TEXT NOT NULL,
+  json TEXT NOT NULL,
+  made_ns INTEGER NOT NULL,
+  revision INTEGER NOT NULL UNIQUE,
+  last_message INTEGER NOT NULL      -- newest message of the session when the result was made
+);
+)sql";
+
+StoredResult read_result(const SQLite::Statement& row) {
+  StoredResult result;
+  result.session = row.getColumn(0).getString();
+  result.complete = row.getColumn(1).getInt() != 0;
+  result.error = row.getColumn(2).getString();
+  result.json = row.getColumn(3).getString();
+  result.made_ns = row.getColumn(4).getInt64();
+  result.revision = row.getColumn(5).getInt64();
+  return result;
+}
+
+constexpr const char* kSelectResult = "SELECT session, complete, error, json, made_ns, revision FROM result ";
+
+class SqliteStore final : public SessionStore {
+ public:
+  explicit SqliteStore(const std::filesystem::path& path)
+      : path_(path), db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
+
+  Result<void> prepare() {
+    const int version = db_.execAndGet("PRAGMA user_version").getInt();
+    if (version > kSchemaVersion) {
+      return invalid_input("{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
+                           path_.string(), version, kSchemaVersion);
+    }
+    if (version == 0 && db_.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0) {
+      return invalid_input("{}: a database of another program; name another file", path_.string());
+    }
+    db_.exec("PRAGMA journal_mode = WAL");
+    db_.exec("PRAGMA synchronous = FULL");
+    if (version == 0) {
+      SQLite::Transaction transaction(db_);
+      db_.exec(kSchema);
+      db_.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
+      transaction.commit();
+    }
+    return {};
+  }
+
+  Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes, std::int64_t received_ns) override {
+    return guarded<bool>([&] {
+      SQLite::Statement insert(db_,
+                               "INSERT OR IGNORE INTO message(session, observation, received_ns, camera, boot_id, sequence, bytes) "
+                               "VALUES (?, ?, ?, ?, ?, ?, ?)");
+      insert.bind(4, imprint.camera_id);
+      insert.bind(5, static_cast<std::int64_t>(imprint.boot_id));  // the same 64 bits
+      insert.bind(6, static_cast<std::int64_t>(imprint.sequence));
+      return run_insert(insert, imprint.session, imprint.observation, received_ns, bytes, 7);
+    });
+  }
+
+  Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes, std::int64_t received_ns) override {
+    return guarded<bool>([&] {
+      SQLite::Statement insert(db_, "INSERT OR IGNORE INTO message(session, observation, received_ns, bytes) VALUES (?, ?, ?, ?)");
+      return run_insert(insert, trigger.session, trigger.observation, received_ns, bytes, 4);
+    });
+  }
+
+  Result<std::int64_t> put_result(const StoredResult& result) override {
+    return guarded<std::int64_t>([&] {
+      SQLite::Transaction transaction(db_, SQLite::TransactionBehavior::IMMEDIATE);
+      SQLite::Statement put(db_, R"sql(
+INSERT INTO result(session, complete, error, json, made_ns, revision, last_message)
+VALUES (?1, ?2, ?3, ?4, ?5, (SELECT ifnull(max(revision), 0) + 1 FROM result),
+        (SELECT ifnull(max(id), 0) FROM message WHERE session = ?1))
+ON CONFLICT(session) DO UPDATE SET
+  made_ns = excluded.made_ns, revision = excluded.revision,
+  complete = excluded.complete, error = excluded.error, json = excluded.json
+WHERE complete <> excluded.complete OR error <> excluded.error OR json <> excluded.json)sql");
+      put.bind(1, result.session);
+      put.bind(2, result.complete ? 1 : 0);
+      put.bind(3, result.error);
+      put.bind(4, result.json);
+      put.bind(5, result.made_ns);
+      put.exec();
+      SQLite::Statement evaluated(db_,
+                                  "UPDATE result SET last_message = (SELECT ifnull(max(id), 0) FROM message WHERE session = ?1) "
+                                  "WHERE session = ?1 RETURNING revision");
+      evaluated.bind(1, result.session);
+      evaluated.executeStep();
+      const std::int64_t revision = evaluated.getColumn(0).getInt64();
+      evaluated.reset();
+      transaction.commit();
+      return revision;
+    });
+  }
+
+  Result<std::optional<StoredResult>> result(const std::string& session) override {
+    return guarded<std::optional<StoredResult>>([&]() -> std::optional<StoredResult> {
+      SQLite::Statement select(db_, std::string(kSelectResult) + "WHERE session = ?");
+      select.bind(1, session);
+      return select.executeStep() ? std::optional(read_result(select)) : std::nullopt;
+    });
+  }
+
+  Result<std::optional<StoredResult>> latest_result() override {
+    return guarded<std::optional<StoredResult>>([&]() -> std::optional<StoredResult> {
+      SQLite::Statement select(db_, std::string(kSelectResult) + "ORDER BY revision DESC LIMIT 1");
+      return select.executeStep() ? std::optional(read_result(select)) : std::nullopt;
+    });
+  }
+
+  Result<std::vector<SessionSummary>> sessions(int limit) override {
+    return guarded<std::vector<SessionSummary>>([&] {
+      SQLite::Statement select(db_, R"sql(
+SELECT session, complete, error, made_ns, revision,
+       CASE WHEN json <> '' THEN json_extract(json, '$.length_mm') END,
+       CASE WHEN json <> '' THEN json_extract(json, '$.max_deflection_mm') END,
+       CASE WHEN json <> '' THEN json_array_length(json, '$.observations') ELSE 0 END
+FROM result ORDER BY revision DESC LIMIT ?)sql");
+      select.bind(1, limit);
+      std::vector<SessionSummary> summaries;
+      while (select.executeStep()) {
+        SessionSummary summary{select.getColumn(0).getString(), select.getColumn(1).getInt() != 0,
+                               select.getColumn(2).getString(), select.getColumn(3).getInt64(),
+                               select.getColumn(4).getInt64(), {}, {}, select.getColumn(7).getInt64()};
+        if (!select.isColumnNull(5)) summary.length_mm = select.getColumn(5).getDouble();
+        if (!select.isColumnNull(6)) summary.max_deflection_mm = select.getColumn(6).getDouble();
+        summaries.push_back(std::move(summary));
+      }
+      return summaries;
+    });
+  }
+
+  Result<bool> knows(const std::string& session) override {
+    return guarded<bool>([&] {
+      SQLite::Statement select(db_, "SELECT EXISTS(SELECT 1 FROM message WHERE session = ?)");
+      select.bind(1, session);
+      select.executeStep();
+      return select.getColumn(0).getInt() != 0;
+    });
+  }
+
+  Result<std::vector<std::string>> unfinished(int limit) override {
+    return guarded<std::vector<std::string>>([&] {
+      SQLite::Statement select(db_, R"sql(
+SELECT session FROM (
+  SELECT message.session AS session, max(message.id) AS newest
+  FROM message LEFT JOIN result ON result.session = message.session
+  WHERE result.session IS NULL OR result.complete = 0
+     OR message.id > result.last_message
+  GROUP BY message.session ORDER BY newest DESC LIMIT ?)
+ORDER BY newest)sql");
+      select.bind(1, limit);
+      std::vector<std::string> names;
+      while (select.executeStep()) names.push_back(select.getColumn(0).getString());
+      return names;
+    });
+  }
+
+  Result<std::vector<StoredMessage>> messages(const std::string& session) override {
+    return guarded<std::vector<StoredMessage>>([&] {
+      SQLite::Statement select(db_, "SELECT camera IS NULL, received_ns, bytes FROM message WHERE session = ? ORDER BY id");
+      select.bind(1, session);
+      std::vector<StoredMessage> messages;
+      while (select.executeStep()) {
+        const SQLite::Column blob = select.getColumn(2);
+        const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
+        messages.push_back({select.getColumn(0).getInt() != 0, select.getColumn(1).getInt64(), {bytes, bytes + blob.getBytes()}});
+      }
+      return messages;
+    });
+  }
+
+ private:
+  // One call at a time, and no exception of the library leaves this file.
+  template <class T, class Call>
+  Result<T> guarded(Call&& call) {
+    const std::lock_guard lock(mutex_);
+    try {
+      return call();
+    } catch (const SQLite::Exception& error) {
+      return job_failed("{}: {}", path_.string(), error.what());
+    }
+  }
+
+  static bool run_insert(SQLite::Statement& insert, const std::string& session, std::uint32_t observation,
+                         std::int64_t received_ns, std::span<const std::uint8_t> bytes, int bytes_column) {
+    insert.bind(1, session);
+    insert.bind(2, static_cast<std::int64_t>(observation));
+    insert.bind(3, received_ns);
+    insert.bind(bytes_column, static_cast<const void*>(bytes.data()), static_cast<int>(bytes.size()));
+    return insert.exec() > 0;
+  }
+
+  std::filesystem::path path_;
+  std::mutex mutex_;
+  SQLite::Database db_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<SessionStore>> SessionStore::open(const std::filesystem::path& path) {
+  try {
+    auto store = std::make_unique<SqliteStore>(path);
+    if (auto ready = store->prepare(); !ready) return pass_on(ready.error());
+    return store;
+  } catch (const SQLite::Exception& error) {
+    return invalid_input("{}: cannot be opened as a database: {}", path.string(), error.what());
+  }
+}
+
+}  // namespace imprint

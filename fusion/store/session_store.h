@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "lib/imprint/imprint.h"
+#include "lib/result/result.h"
+#include "lib/wire/wire.h"
+
+namespace imprint {
+
+/// A session's result as it stands on disk.
+struct StoredResult {
+  std::string session;
+  bool complete = false;
+  std::string error;           ///< why there is no measurement; empty when there is
+  std::string json;            ///< `imprint.result/1`; empty when there is no measurement
+  std::int64_t made_ns = 0;    ///< since the Unix epoch
+  std::int64_t revision = 0;   ///< counts every result of every session, from 1
+};
+
+/// One line of the list of sessions; figures are absent when there is no measurement.
+struct SessionSummary {
+  std::string session;
+  bool complete = false;
+  std::string error;
+  std::int64_t made_ns = 0;
+  std::int64_t revision = 0;
+  std::optional<double> length_mm;
+  std::optional<double> max_deflection_mm;
+  std::int64_t observations = 0;
+};
+
+/// A message as it was received.
+struct StoredMessage {
+  bool is_trigger = false;          ///< else an imprint
+  std::int64_t received_ns = 0;     ///< since the Unix epoch
+  std::vector<std::uint8_t> bytes;  ///< as they came over the wire
+};
+
+/// What fusion must not lose: every trigger and imprint as received, and each session's latest result, in one SQLite
+/// file. A call that returns has its data on disk (write-ahead log, synchronous FULL); a process killed at any moment
+/// leaves a file that opens again without repair. Safe to use from several threads.
+class SessionStore {
+ public:
+  /// Opens or creates the file. Fails (invalid_input) when it cannot be opened, is no such database or was written by
+  /// a newer version.
+  static Result<std::unique_ptr<SessionStore>> open(const std::filesystem::path& path);
+  virtual ~SessionStore() = default;
+
+  /// False when this imprint (camera, boot, sequence) is already stored. All writes fail (job_failed) with the
+  /// database's own words, e.g. when the disk is full, and have then changed nothing.
+  virtual Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes, std::int64_t received_ns) = 0;
+  /// False when the same trigger is already stored.
+  virtual Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes, std::int64_t received_ns) = 0;
+  /// Replaces the session's result and gives its revision; the old one's when nothing but `made_ns` is new.
+  virtual Result<std::int64_t> put_result(const StoredResult& result) = 0;
+
+  virtual Result<std::optional<StoredResult>> result(const std::string& session) = 0;
+  virtual Result<std::optional<StoredResult>> latest_result() = 0;
+  /// Newest first.
+  virtual Result<std::vector<SessionSummary>> sessions(int limit) = 0;
+  virtual Result<bool> knows(const std::string& session) = 0;
+  /// Sessions whose result is not complete or older than their newest imprint; the newest `limit`, oldest first.
+  virtual Result<std::vector<std::string>> unfinished(int limit) = 0;
+  /// All messages of a session in the order they were received.
+  virtual Result<std::vector<StoredMessage>> messages(const std::string& session) = 0;
+};
+
+}  // namespace imprint
