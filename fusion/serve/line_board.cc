@@ -1,0 +1,189 @@
+#include "fusion/serve/line_board.h"
+
+#include <ctime>
+
+#include <fmt/chrono.h>
+
+namespace imprint {
+namespace {
+
+using nlohmann::json;
+
+double age_s(LineBoard::Time then, LineBoard::Time now) {
+  return std::chrono::duration_cast<std::chrono::duration<double>>(now - then).count();
+}
+
+// 64 bits do not fit the numbers of every JSON reader.
+std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
+
+json health_json(const Health& health, double age) {
+  return {{"time", utc_text(health.time_ns)},
+          {"age_s", age},
+          {"boot_id", hex(health.boot_id)},
+          {"sequence", health.sequence},
+          {"frames", health.frames},
+          {"failed_frames", health.failed_frames},
+          {"targets_seen", health.targets_seen},
+          {"reprojection_rms_px", health.reprojection_rms_px},
+          {"contrast", health.contrast},
+          {"last_error", health.last_error},
+          {"version", health.version}};
+}
+
+json imprint_json(const Imprint& imprint, double age) {
+  return {{"session", imprint.session},
+          {"observation", imprint.observation},
+          {"rotation_deg", imprint.rotation_deg},
+          {"sequence", imprint.sequence},
+          {"sensor_time", utc_text(imprint.sensor_time_ns)},
+          {"age_s", age},
+          {"targets_used", imprint.quality.targets_used},
+          {"reprojection_rms_px", imprint.quality.reprojection_rms_px},
+          {"edge_coverage", imprint.quality.edge_coverage},
+          {"saturated_fraction", imprint.quality.saturated_fraction},
+          {"method", imprint.method},
+          {"failure", imprint.failure},
+          {"warnings", imprint.warnings}};
+}
+
+}  // namespace
+
+std::string utc_text(std::int64_t time_ns) {
+  const std::int64_t second_ns = 1'000'000'000;
+  std::int64_t seconds = time_ns / second_ns;
+  std::int64_t rest_ns = time_ns % second_ns;
+  if (rest_ns < 0) {
+    rest_ns += second_ns;
+    --seconds;
+  }
+  const std::time_t whole = seconds;
+  std::tm utc{};
+  gmtime_r(&whole, &utc);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", utc, rest_ns / 1'000'000);
+}
+
+json to_json(const StoredResult& result) {
+  json document = {{"schema", "imprint.session_result/1"},
+                   {"session", result.session},
+                   {"complete", result.complete},
+                   {"error", result.error},
+                   {"made_at", utc_text(result.made_ns)},
+                   {"revision", result.revision},
+                   {"result", nullptr}};
+  if (!result.json.empty()) document["result"] = json::parse(result.json, nullptr, false);
+  if (document["result"].is_discarded()) document["result"] = nullptr;
+  return document;
+}
+
+json to_json(const SessionSummary& summary) {
+  json document = {{"session", summary.session},           {"complete", summary.complete},
+                   {"error", summary.error},               {"made_at", utc_text(summary.made_ns)},
+                   {"revision", summary.revision},         {"observations", summary.observations},
+                   {"length_mm", nullptr},                 {"max_deflection_mm", nullptr}};
+  if (summary.length_mm) document["length_mm"] = *summary.length_mm;
+  if (summary.max_deflection_mm) document["max_deflection_mm"] = *summary.max_deflection_mm;
+  return document;
+}
+
+LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started)
+    : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
+  for (const std::string& id : camera_ids) cameras_[id];
+  for (const char* counter : {"imprints", "repeated", "surplus", "refused", "malformed", "missed", "dropped", "results"}) {
+    counters_[counter] = 0;
+  }
+}
+
+void LineBoard::set_alive(const std::string& camera_id, bool alive) {
+  const std::lock_guard lock(mutex_);
+  if (const auto camera = cameras_.find(camera_id); camera != cameras_.end()) camera->second.alive = alive;
+}
+
+void LineBoard::set_health(const Health& health, Time now) {
+  const std::lock_guard lock(mutex_);
+  const auto camera = cameras_.find(health.camera_id);
+  if (camera == cameras_.end()) return;
+  camera->second.health = health;
+  camera->second.health_at = now;
+}
+
+void LineBoard::note_imprint(const Imprint& imprint, Time now) {
+  const std::lock_guard lock(mutex_);
+  const auto camera = cameras_.find(imprint.camera_id);
+  if (camera == cameras_.end()) return;
+  camera->second.imprint = imprint;
+  camera->second.imprint->upper = camera->second.imprint->lower = camera->second.imprint->axis = {};
+  camera->second.imprint_at = now;
+}
+
+void LineBoard::set_session(CurrentSession session) {
+  const std::lock_guard lock(mutex_);
+  session_ = std::move(session);
+}
+
+void LineBoard::set_result(const StoredResult& result) {
+  json document = to_json(result);
+  if (document["result"].is_object()) document["result"].erase("sections");  // the status stays small
+  const std::lock_guard lock(mutex_);
+  last_result_ = std::move(document);
+}
+
+void LineBoard::count(const std::string& counter, std::uint64_t by) {
+  const std::lock_guard lock(mutex_);
+  counters_[counter] += by;
+}
+
+void LineBoard::set_alarm(const std::string& name, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  if (text.empty()) {
+    alarms_.erase(name);
+  } else {
+    alarms_[name] = text;
+  }
+}
+
+bool LineBoard::has_alarm() const {
+  const std::lock_guard lock(mutex_);
+  return !alarms_.empty();
+}
+
+json LineBoard::status(Time now) const {
+  const std::lock_guard lock(mutex_);
+  json cameras = json::array();
+  for (const std::string& id : camera_ids_) cameras.push_back(camera_json(id, cameras_.at(id), now));
+  json session;
+  if (session_) {
+    session = {{"session", session_->session},
+               {"observations_expected", session_->expected},
+               {"complete", session_->complete},
+               {"observations", json::array()}};
+    for (const ObservationState& state : session_->observations) {
+      session["observations"].push_back({{"index", state.index},
+                                         {"rotation_deg", state.rotation_deg},
+                                         {"settled", state.settled},
+                                         {"reported", state.reported},
+                                         {"waiting", state.waiting}});
+    }
+  }
+  json alarms = json::array();
+  for (const auto& [name, text] : alarms_) alarms.push_back({{"name", name}, {"text", text}});
+  return {{"schema", "imprint.status/1"},
+          {"site", identity_.site},
+          {"line", identity_.line},
+          {"method", identity_.method},
+          {"version", identity_.version},
+          {"uptime_s", age_s(started_, now)},
+          {"cameras", std::move(cameras)},
+          {"session", std::move(session)},
+          {"last_result", last_result_},
+          {"counters", counters_},
+          {"alarms", std::move(alarms)}};
+}
+
+json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {
+  json document = {{"id", id}, {"alive", camera.alive}, {"health", nullptr}, {"last_imprint", nullptr}};
+  if (camera.health) document["health"] = health_json(*camera.health, age_s(camera.health_at, now));
+  if (camera.imprint) document["last_imprint"] = imprint_json(*camera.imprint, age_s(camera.imprint_at, now));
+  return document;
+}
+
+}  // namespace imprint

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "fusion/receive/observation_assembler.h"
+#include "fusion/store/session_store.h"
+#include "lib/imprint/imprint.h"
+#include "lib/wire/wire.h"
+
+namespace imprint {
+
+/// Time since the Unix epoch as people and programs read it: "2026-11-22T18:05:02.123Z".
+std::string utc_text(std::int64_t time_ns);
+
+/// `imprint.session_result/1`: a stored result with its measurement (`imprint.result/1`, or null) in `result`.
+nlohmann::json to_json(const StoredResult& result);
+nlohmann::json to_json(const SessionSummary& summary);
+
+/// The session being measured.
+struct CurrentSession {
+  std::string session;
+  std::uint32_t expected = 0;
+  bool complete = false;
+  std::vector<ObservationState> observations;
+};
+
+/// What is known of the line at this moment, for whoever asks: the page, `imprint status`. Safe to use from several
+/// threads; knows no clock.
+class LineBoard {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  struct Identity {
+    std::string site;
+    std::string line;
+    std::string method;
+    std::string version;
+  };
+
+  LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started);
+
+  void set_alive(const std::string& camera_id, bool alive);
+  void set_health(const Health& health, Time now);
+  void note_imprint(const Imprint& imprint, Time now);
+  void set_session(CurrentSession session);
+  void set_result(const StoredResult& result);
+  /// Adds to one of the counters of the status document.
+  void count(const std::string& counter, std::uint64_t by = 1);
+  /// A condition that needs a person; an empty text ends it.
+  void set_alarm(const std::string& name, const std::string& text);
+
+  /// `imprint.status/1` (docs/configuration.md).
+  [[nodiscard]] nlohmann::json status(Time now) const;
+  [[nodiscard]] bool has_alarm() const;
+
+ private:
+  struct Camera {
+    bool alive = false;
+    std::optional<Health> health;
+    Time health_at;
+    std::optional<Imprint> imprint;  // without its curves
+    Time imprint_at;
+  };
+  [[nodiscard]] static nlohmann::json camera_json(const std::string& id, const Camera& camera, Time now);
+
+  mutable std::mutex mutex_;
+  Identity identity_;
+  Time started_;
+  std::vector<std::string> camera_ids_;
+  std::map<std::string, Camera> cameras_;
+  std::optional<CurrentSession> session_;
+  nlohmann::json last_result_;
+  std::map<std::string, std::uint64_t> counters_;
+  std::map<std::string, std::string> alarms_;
+};
+
+}  // namespace imprint
