@@ -10,19 +10,28 @@
 
 namespace imprint {
 
-/// The protobuf bytes of `imprint.v1.Imprint`: at most 4,096 for 3 x 500 points with weights,
-/// curve points true to 0.002 px.
+/// The most an encoded imprint takes, contract section 4.
+inline constexpr std::size_t kMaxImprintBytes = 4096;
+
+/// The protobuf bytes of `imprint.v1.Imprint` (packing: proto/imprint.proto): never more than kMaxImprintBytes,
+/// curve points true to 0.002 px, weights to 1/510. Curves too rough for that lose, in this order, the offsets
+/// of weight 0, then fineness of the weights, then of the offsets (a warning in the imprint says so).
+/// Texts are cut: ids to 64 bytes, `failure` to 240, the first three warnings to 120 each.
+/// An imprint that no receiver could use (pose not finite, curves of different lengths) is sent without its
+/// curves, `failure` telling why.
 std::vector<std::uint8_t> encode_imprint(const Imprint& imprint);
 
 /// Fails (invalid_input) on bytes that are no imprint or carry impossible values; never throws, bounded memory.
+/// What it returns is finite, with a rotation for a pose and a unit direction; it has three curves of the same
+/// 1 to kImprintStations stations, weights 0 to 1, or none and a `failure`.
 Result<Imprint> decode_imprint(std::span<const std::uint8_t> bytes);
 
 struct Trigger {
   std::string session;
   std::uint32_t observation = 0;
   double rotation_deg = 0.0;
-  std::int64_t fire_at_ns = 0;            ///< sensor time, since the Unix epoch; 0: at once
-  std::uint32_t observations_expected = 0; ///< of this session; 0: not known
+  std::int64_t fire_at_ns = 0;              ///< sensor time, since the Unix epoch; 0: at once
+  std::uint32_t observations_expected = 0;  ///< of this session; 0: not known
 };
 std::vector<std::uint8_t> encode_trigger(const Trigger& trigger);
 Result<Trigger> decode_trigger(std::span<const std::uint8_t> bytes);
@@ -31,13 +40,13 @@ struct Health {
   std::string camera_id;
   std::int64_t time_ns = 0;
   std::uint64_t boot_id = 0;
-  std::uint64_t sequence = 0;      ///< of the last imprint
-  std::uint64_t frames = 0;        ///< frames taken since start
-  std::uint64_t failed_frames = 0; ///< of which no imprint could be made
+  std::uint64_t sequence = 0;       ///< of the last imprint
+  std::uint64_t frames = 0;         ///< frames taken since start
+  std::uint64_t failed_frames = 0;  ///< of which no imprint could be made
   int targets_seen = 0;
   double reprojection_rms_px = 0.0;
   double contrast = 0.0;
-  std::string last_error;          ///< one line, at most 80 characters; empty when the last frame was good
+  std::string last_error;  ///< one line, cut to 80 bytes; empty when the last frame was good
   std::string version;
 };
 std::vector<std::uint8_t> encode_health(const Health& health);
@@ -46,8 +55,8 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes);
 /// A `Result` message: the JSON document of `imprint.result/1` with its session and whether it is the last.
 struct ResultMessage {
   std::string session;
-  bool complete = false;   ///< all expected observations are in, or the session was closed
-  std::string error;       ///< why there is no measurement; empty when there is
+  bool complete = false;  ///< all expected observations are in, or the session was closed
+  std::string error;      ///< why there is no measurement; empty when there is
   std::string json;
 };
 std::vector<std::uint8_t> encode_result(const ResultMessage& result);

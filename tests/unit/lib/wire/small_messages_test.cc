@@ -1,0 +1,100 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+
+#include "lib/wire/wire.h"
+#include "lib/wire/wire_text.h"
+
+using namespace imprint;
+
+TEST_CASE("trigger message: comes back whole") {
+  const Trigger sent{"heat-0417", 2, 90.5, 1795370000123456789, 3};
+  const auto got = decode_trigger(encode_trigger(sent));
+  REQUIRE(got);
+  CHECK(got->session == sent.session);
+  CHECK(got->observation == sent.observation);
+  CHECK(got->rotation_deg == sent.rotation_deg);
+  CHECK(got->fire_at_ns == sent.fire_at_ns);
+  CHECK(got->observations_expected == sent.observations_expected);
+}
+
+TEST_CASE("trigger message: a session that cannot be a key is refused") {
+  for (const char* session : {"", "a/b", "*", "..", "heat 7"}) {
+    const auto got = decode_trigger(encode_trigger({session, 0, 0.0, 0, 0}));
+    REQUIRE_FALSE(got);
+    CHECK(got.error().message.find("trigger: session id: expected") == 0);
+  }
+  CHECK_FALSE(decode_trigger(encode_trigger({"a", 0, std::numeric_limits<double>::infinity(), 0, 0})));
+}
+
+TEST_CASE("health message: comes back whole in about 120 bytes") {
+  const Health sent{"cam2",
+                    1795370000123456789,
+                    0x123456789abcdef0,
+                    4711,
+                    4800,
+                    89,
+                    31,
+                    0.127,
+                    0.41,
+                    "frame 4800: 2 targets found, 4 needed",
+                    "0.1.0"};
+  const auto bytes = encode_health(sent);
+  WARN("health: " << bytes.size() << " bytes");
+  CHECK(bytes.size() <= 120);
+  const auto got = decode_health(bytes);
+  REQUIRE(got);
+  CHECK(got->camera_id == sent.camera_id);
+  CHECK(got->time_ns == sent.time_ns);
+  CHECK(got->boot_id == sent.boot_id);
+  CHECK(got->sequence == sent.sequence);
+  CHECK(got->frames == sent.frames);
+  CHECK(got->failed_frames == sent.failed_frames);
+  CHECK(got->targets_seen == sent.targets_seen);
+  CHECK(got->reprojection_rms_px == Approx(sent.reprojection_rms_px).epsilon(1e-7));  // float
+  CHECK(got->contrast == Approx(sent.contrast).epsilon(1e-7));
+  CHECK(got->last_error == sent.last_error);
+  CHECK(got->version == sent.version);
+}
+
+TEST_CASE("health message: a long error is cut to 80 bytes") {
+  Health sent;
+  sent.camera_id = "cam1";
+  sent.last_error = std::string(200, 'e');
+  const auto got = decode_health(encode_health(sent));
+  REQUIRE(got);
+  CHECK(got->last_error == std::string(77, 'e') + "...");
+}
+
+TEST_CASE("result message: comes back whole") {
+  const ResultMessage sent{"heat-0417", true, "", R"({"schema": "imprint.result/1", "warnings": ["čidlo"]})"};
+  const auto got = decode_result(encode_result(sent));
+  REQUIRE(got);
+  CHECK(got->session == sent.session);
+  CHECK(got->complete == sent.complete);
+  CHECK(got->error == sent.error);
+  CHECK(got->json == sent.json);
+}
+
+TEST_CASE("small messages: damaged bytes are refused or decode, and never crash") {
+  const auto health = encode_health({"cam2", 1, 2, 3, 4, 5, 6, 0.1, 0.2, "error", "0.1.0"});
+  for (std::size_t length = 0; length < health.size(); ++length) {
+    (void)decode_health(std::span(health).first(length));
+    (void)decode_trigger(std::span(health).first(length));
+    (void)decode_result(std::span(health).first(length));
+  }
+  CHECK_FALSE(decode_health({}));
+  CHECK_FALSE(decode_trigger({}));
+  CHECK_FALSE(decode_result({}));
+}
+
+TEST_CASE("wire text: only well-formed UTF-8 passes") {
+  CHECK(valid_utf8("průvis 1 200 °C ✓ 🔥") == "průvis 1 200 °C ✓ 🔥");
+  CHECK(valid_utf8("\xc0\x80") == "??");            // overlong
+  CHECK(valid_utf8("\xed\xa0\x80") == "???");       // surrogate
+  CHECK(valid_utf8("\xf4\x90\x80\x80") == "????");  // beyond U+10FFFF
+  CHECK(valid_utf8("a\xe2\x9c") == "a??");          // cut
+  CHECK(wire_line("✓✓✓", 9) == "✓✓✓");
+  CHECK(wire_line("✓✓✓✓", 9) == "✓✓...");
+  CHECK(wire_line("abc", 2) == "..");
+}
