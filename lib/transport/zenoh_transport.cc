@@ -1,0 +1,312 @@
+#include <algorithm>
+#include <exception>
+#include <mutex>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "lib/transport/callback_gate.h"
+#include "lib/transport/key_expression.h"
+#include "lib/transport/transport.h"
+#include "lib/transport/zenoh_bridge/handlers.h"
+#include "zenoh_bridge.h"
+
+namespace imprint {
+namespace {
+
+/// What Zenoh says of a failure, without the place in its source where it said so.
+std::string reason_of(const std::exception& error) {
+  std::string reason = error.what();
+  if (const auto at = reason.find(" at /"); at != std::string::npos) {
+    const auto end = reason.find(".rs:", at);
+    if (end != std::string::npos) reason.erase(at, reason.find_first_of(". ", end + 4) - at);
+  }
+  return reason;
+}
+
+rust::Slice<const std::uint8_t> slice(std::span<const std::uint8_t> bytes) { return {bytes.data(), bytes.size()}; }
+rust::Str str(std::string_view text) { return {text.data(), text.size()}; }
+std::string_view view(rust::Str text) { return {text.data(), text.size()}; }
+
+/// Priority and congestion control of each class of traffic.
+///
+/// Classes never share a priority: within one, messages that may be dropped can stall for seconds behind
+/// messages that block. `command` is rare and small and must arrive: it blocks, and a link that stays full is
+/// given up by Zenoh after 5 s. An imprint must never hold up its camera: when the link is full it is dropped
+/// and later recovered from the publisher's history. The next health report makes good for a lost one. Bulk
+/// (results, crops, logs) is fragmented, and fragments that may be dropped are given up after 50 ms: it blocks,
+/// below everything else, so its sender must be a thread that may wait.
+bridge::PublisherSetup setup_of(const PublisherOptions& options) {
+  bridge::PublisherSetup setup{};
+  setup.history = options.history;
+  switch (options.traffic) {
+    case Traffic::command:
+      setup.priority = 2;  // interactive, high
+      setup.block = true;
+      setup.express = true;
+      break;
+    case Traffic::imprint:
+      setup.priority = 4;  // data, high
+      setup.express = true;
+      break;
+    case Traffic::health:
+      setup.priority = 6;  // data, low
+      break;
+    case Traffic::bulk:
+      setup.priority = 7;  // background
+      setup.block = true;
+      break;
+  }
+  return setup;
+}
+
+class SampleForwarder final : public bridge::SampleHandler {
+ public:
+  SampleForwarder(std::shared_ptr<CallbackGate> gate, SampleCallback on_sample, MissCallback on_miss)
+      : gate_(std::move(gate)), on_sample_(std::move(on_sample)), on_miss_(std::move(on_miss)) {}
+
+  void on_sample(rust::Str key, rust::Slice<const std::uint8_t> payload) const override {
+    gate_->pass([&] { on_sample_({std::string(key), Bytes(payload.begin(), payload.end())}); });
+  }
+  void on_miss(rust::Str source, std::uint32_t count) const override {
+    if (on_miss_) gate_->pass([&] { on_miss_(view(source), count); });
+  }
+
+ private:
+  std::shared_ptr<CallbackGate> gate_;
+  SampleCallback on_sample_;
+  MissCallback on_miss_;
+};
+
+class LivenessForwarder final : public bridge::LivenessHandler {
+ public:
+  LivenessForwarder(std::shared_ptr<CallbackGate> gate, LivenessCallback on_change)
+      : gate_(std::move(gate)), on_change_(std::move(on_change)) {}
+
+  void on_change(rust::Str key, bool alive) const override {
+    gate_->pass([&] { on_change_(view(key), alive); });
+  }
+
+ private:
+  std::shared_ptr<CallbackGate> gate_;
+  LivenessCallback on_change_;
+};
+
+class ZenohQuery final : public Query {
+ public:
+  explicit ZenohQuery(rust::Box<bridge::Request> request) : request_(std::move(request)) {}
+
+  std::string key() const override { return std::string(request_->key()); }
+  std::string parameters() const override { return std::string(request_->parameters()); }
+  Bytes payload() const override {
+    const auto bytes = request_->payload();
+    return {bytes.begin(), bytes.end()};
+  }
+  Result<void> reply(std::span<const std::uint8_t> payload) override {
+    return answer([&] { request_->reply(slice(payload)); });
+  }
+  Result<void> reply_error(std::string_view message) override {
+    return answer([&] { request_->reply_error(str(message)); });
+  }
+
+ private:
+  template <class Send>
+  Result<void> answer(Send&& send) {
+    const std::lock_guard lock(mutex_);
+    if (answered_) return job_failed("query on '{}': expected one answer, found a second", key());
+    try {
+      send();
+    } catch (const rust::Error& error) {
+      return job_failed("query on '{}': cannot be answered: {}", key(), reason_of(error));
+    }
+    answered_ = true;
+    return {};
+  }
+
+  rust::Box<bridge::Request> request_;
+  std::mutex mutex_;
+  bool answered_ = false;
+};
+
+class RequestForwarder final : public bridge::RequestHandler {
+ public:
+  RequestForwarder(std::shared_ptr<CallbackGate> gate, QueryCallback on_query)
+      : gate_(std::move(gate)), on_query_(std::move(on_query)) {}
+
+  void on_request(rust::Box<bridge::Request> request) const override {
+    gate_->pass([&] { on_query_(std::make_shared<ZenohQuery>(std::move(request))); });
+  }
+
+ private:
+  std::shared_ptr<CallbackGate> gate_;
+  QueryCallback on_query_;
+};
+
+/// The session lives until the last of what was declared on it is gone, in whatever order they go.
+using SharedSession = std::shared_ptr<rust::Box<bridge::Session>>;
+
+class ZenohPublisher final : public Publisher {
+ public:
+  ZenohPublisher(SharedSession session, std::string key, rust::Box<bridge::Publisher> publisher)
+      : session_(std::move(session)), key_(std::move(key)), publisher_(std::move(publisher)) {}
+
+  Result<void> put(std::span<const std::uint8_t> payload) override {
+    try {
+      publisher_->put(slice(payload));
+      return {};
+    } catch (const rust::Error& error) {
+      return job_failed("key '{}': cannot be published: {}", key_, reason_of(error));
+    }
+  }
+
+ private:
+  SharedSession session_;
+  std::string key_;
+  rust::Box<bridge::Publisher> publisher_;
+};
+
+/// Whatever the Rust side declared; taken back after the last callback has returned.
+template <class Declared>
+class ZenohDeclaration final : public Declaration {
+ public:
+  ZenohDeclaration(SharedSession session, std::shared_ptr<CallbackGate> gate, rust::Box<Declared> declared)
+      : session_(std::move(session)), gate_(std::move(gate)), declared_(std::move(declared)) {}
+  ~ZenohDeclaration() override { gate_->close(); }
+  ZenohDeclaration(const ZenohDeclaration&) = delete;
+  ZenohDeclaration& operator=(const ZenohDeclaration&) = delete;
+
+ private:
+  SharedSession session_;
+  std::shared_ptr<CallbackGate> gate_;
+  rust::Box<Declared> declared_;
+};
+
+class ZenohTransport final : public Transport {
+ public:
+  explicit ZenohTransport(rust::Box<bridge::Session> session)
+      : session_(std::make_shared<rust::Box<bridge::Session>>(std::move(session))) {}
+
+  Result<std::unique_ptr<Publisher>> publish(const std::string& key, PublisherOptions options) override {
+    if (auto checked = check_key(key, false); !checked) return pass_on(checked.error());
+    try {
+      return std::make_unique<ZenohPublisher>(session_, key, (*session_)->declare_publisher(key, setup_of(options)));
+    } catch (const rust::Error& error) {
+      return job_failed("key '{}': cannot be declared for publishing: {}", key, reason_of(error));
+    }
+  }
+
+  Result<std::unique_ptr<Declaration>> subscribe(const std::string& key, SubscriberOptions options,
+                                                 SampleCallback on_sample, MissCallback on_miss) override {
+    return declare<bridge::Subscriber>(key, true, "subscribed", [&](const std::shared_ptr<CallbackGate>& gate) {
+      return (*session_)->declare_subscriber(
+          key, options.history, std::make_shared<SampleForwarder>(gate, std::move(on_sample), std::move(on_miss)));
+    });
+  }
+
+  Result<std::unique_ptr<Declaration>> answer(const std::string& key, QueryCallback on_query) override {
+    return declare<bridge::Queryable>(key, true, "answered", [&](const std::shared_ptr<CallbackGate>& gate) {
+      return (*session_)->declare_queryable(key, std::make_shared<RequestForwarder>(gate, std::move(on_query)));
+    });
+  }
+
+  Result<std::unique_ptr<Declaration>> announce(const std::string& key) override {
+    return declare<bridge::Token>(
+        key, false, "announced", [&](const std::shared_ptr<CallbackGate>&) { return (*session_)->declare_token(key); });
+  }
+
+  Result<std::unique_ptr<Declaration>> watch_liveness(const std::string& key, LivenessCallback on_change) override {
+    return declare<bridge::TokenWatch>(key, true, "watched", [&](const std::shared_ptr<CallbackGate>& gate) {
+      return (*session_)->watch_tokens(key, std::make_shared<LivenessForwarder>(gate, std::move(on_change)));
+    });
+  }
+
+  Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
+                                  std::chrono::milliseconds timeout) override {
+    const std::string key = selector.substr(0, selector.find('?'));
+    if (auto checked = check_key(key, true); !checked) return pass_on(checked.error());
+    try {
+      std::vector<Sample> samples;
+      const auto wait_ms = static_cast<std::uint64_t>(std::max<std::int64_t>(timeout.count(), 0));
+      for (const auto& reply : (*session_)->get(selector, slice(payload), wait_ms)) {
+        if (reply.timed_out) continue;
+        if (!reply.ok)
+          return job_failed("query '{}': {}", selector, std::string(reply.payload.begin(), reply.payload.end()));
+        samples.push_back({std::string(reply.key), Bytes(reply.payload.begin(), reply.payload.end())});
+      }
+      return samples;
+    } catch (const rust::Error& error) {
+      return job_failed("query '{}': cannot be sent: {}", selector, reason_of(error));
+    }
+  }
+
+ private:
+  template <class Declared, class Declare>
+  Result<std::unique_ptr<Declaration>> declare(const std::string& key, bool wildcards, std::string_view verb,
+                                               Declare&& make) {
+    if (auto checked = check_key(key, wildcards); !checked) return pass_on(checked.error());
+    auto gate = std::make_shared<CallbackGate>();
+    try {
+      return std::make_unique<ZenohDeclaration<Declared>>(session_, gate, make(gate));
+    } catch (const rust::Error& error) {
+      return job_failed("key '{}': cannot be {}: {}", key, verb, reason_of(error));
+    }
+  }
+
+  SharedSession session_;
+};
+
+Result<void> check_endpoint(std::string_view side, const std::string& endpoint) {
+  const auto slash = endpoint.find('/');
+  const std::string_view protocol = std::string_view(endpoint).substr(0, slash);
+  const bool known = protocol == "tcp" || protocol == "tls" || protocol == "udp";
+  if (slash == std::string::npos || !known || endpoint.find(':', slash) == std::string::npos)
+    return invalid_input("{} endpoint '{}': expected tcp/HOST:PORT, tls/HOST:PORT or udp/HOST:PORT", side, endpoint);
+  return {};
+}
+
+Result<void> check_endpoints(const ZenohConfig& config) {
+  for (const auto& endpoint : config.connect)
+    if (auto checked = check_endpoint("connect", endpoint); !checked) return checked;
+  for (const auto& endpoint : config.listen)
+    if (auto checked = check_endpoint("listen", endpoint); !checked) return checked;
+  return {};
+}
+
+std::string joined(const std::vector<std::string>& endpoints) {
+  std::string text;
+  for (const auto& endpoint : endpoints) text += (text.empty() ? "" : ", ") + endpoint;
+  return text;
+}
+
+/// The session's configuration as Zenoh reads it. Peer and router mode open at once and go on trying to
+/// connect; client mode would wait for its router. No multicast: only the endpoints named are ever spoken to.
+std::string session_config(const ZenohConfig& config) {
+  const nlohmann::json json = {
+      {"mode", config.router ? "router" : "peer"},
+      {"connect",
+       {{"endpoints", config.connect},
+        {"timeout_ms", -1},
+        {"exit_on_failure", false},
+        {"retry", {{"period_init_ms", 200}, {"period_max_ms", 2000}, {"period_increase_factor", 2}}}}},
+      {"listen", {{"endpoints", config.listen}, {"timeout_ms", 0}, {"exit_on_failure", true}}},
+      {"scouting", {{"multicast", {{"enabled", false}}}}},
+      {"timestamping", {{"enabled", false}}},  // messages carry their own sensor time
+  };
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config) {
+  if (auto checked = check_endpoints(config); !checked) return pass_on(checked.error());
+  try {
+    static std::once_flag log_once;
+    std::call_once(log_once, [] { bridge::log_to_stderr("error"); });
+    return std::make_unique<ZenohTransport>(bridge::open_session(session_config(config)));
+  } catch (const rust::Error& error) {
+    return job_failed("Zenoh session (connect [{}], listen [{}]): cannot be opened: {}", joined(config.connect),
+                      joined(config.listen), reason_of(error));
+  }
+}
+
+}  // namespace imprint
