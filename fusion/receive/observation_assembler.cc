@@ -45,11 +45,16 @@ std::string_view arrival_name(Arrival arrival) {
 ObservationAssembler::ObservationAssembler(std::vector<std::string> camera_ids, AssemblerConfig config)
     : camera_ids_(std::move(camera_ids)), config_(config) {}
 
-Result<void> ObservationAssembler::add(const Trigger& trigger, Time now) {
+Result<void> ObservationAssembler::check(const Trigger& trigger) const {
   if (trigger.observation >= config_.max_observations || trigger.observations_expected > config_.max_observations) {
     return invalid_input("trigger of session {}: observation {} of {}, but a session has at most {}", trigger.session,
                          trigger.observation, trigger.observations_expected, config_.max_observations);
   }
+  return {};
+}
+
+Result<void> ObservationAssembler::add(const Trigger& trigger, Time now) {
+  if (auto valid = check(trigger); !valid) return valid;
   Session& session = open_session(trigger.session, now);
   Pending& observation = open_observation(session, trigger.observation, trigger.rotation_deg, now);
   if (trigger.observations_expected > session.expected) {

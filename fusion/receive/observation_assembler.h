@@ -58,6 +58,8 @@ class ObservationAssembler {
 
   ObservationAssembler(std::vector<std::string> camera_ids, AssemblerConfig config);
 
+  /// What `add` would refuse the trigger for.
+  [[nodiscard]] Result<void> check(const Trigger& trigger) const;
   /// Fails (invalid_input) on an observation beyond `max_observations`. A repeated trigger changes nothing but an
   /// unknown number of expected observations.
   Result<void> add(const Trigger& trigger, Time now);

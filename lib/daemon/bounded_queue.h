@@ -29,43 +29,50 @@ class BoundedQueue {
     return true;
   }
 
-  /// The next item; none when `until` has passed or the queue was closed.
+  /// The next item; none when there was none until `until`, or the queue is closed and empty.
   std::optional<T> pop_until(Time until) {
     std::unique_lock lock(mutex_);
     changed_.wait_until(lock, until, [&] { return closed_ || !items_.empty(); });
-    if (closed_ || items_.empty()) return std::nullopt;
     return take_front();
   }
 
-  /// The next item; none when there is none now or the queue was closed.
-  std::optional<T> try_pop() { return pop_until(Time::min()); }
+  /// The next item; none when there is none at this moment.
+  std::optional<T> try_pop() {
+    const std::lock_guard lock(mutex_);
+    return take_front();
+  }
 
-  /// The next item, however long it takes; none only when the queue was closed.
+  /// The next item, however long it takes; none when the queue is closed and empty.
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || !items_.empty(); });
-    if (closed_) return std::nullopt;
     return take_front();
   }
 
-  /// Wakes who waits; what is still queued is dropped.
-  void close() {
+  /// Takes nothing more; what is queued can still be popped.
+  void close() { close_and(false); }
+  /// Takes nothing more and forgets what is queued.
+  void drop() { close_and(true); }
+
+  /// Closed and empty: nothing will come any more.
+  [[nodiscard]] bool finished() const {
+    const std::lock_guard lock(mutex_);
+    return closed_ && items_.empty();
+  }
+
+ private:
+  void close_and(bool forget) {
     {
       const std::lock_guard lock(mutex_);
       closed_ = true;
-      items_.clear();
+      if (forget) items_.clear();
     }
     changed_.notify_all();
   }
 
-  [[nodiscard]] bool closed() const {
-    const std::lock_guard lock(mutex_);
-    return closed_;
-  }
-
- private:
-  T take_front() {
-    T item = std::move(items_.front());
+  std::optional<T> take_front() {
+    if (items_.empty()) return std::nullopt;
+    std::optional<T> item(std::move(items_.front()));
     items_.pop_front();
     return item;
   }

@@ -7,6 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "lib/wire/keys.h"
+
 namespace imprint {
 
 std::optional<int> parse_program_options(int argc, char** argv, const std::string& name, const std::string& purpose,
@@ -26,6 +28,19 @@ std::optional<int> parse_program_options(int argc, char** argv, const std::strin
   return std::nullopt;
 }
 
+int exit_status_of(const std::string& name, const std::function<Result<void>()>& run) {
+  try {
+    if (const auto done = run(); !done) {
+      std::cerr << name << ": " << done.error().message << '\n';
+      return done.error().exit_status();
+    }
+    return 0;
+  } catch (const std::exception& error) {  // a fault of ours or of a library: still one line
+    std::cerr << name << ": unexpected: " << error.what() << '\n';
+    return 1;
+  }
+}
+
 Result<toml::table> read_program_config(const ProgramOptions& options) {
   auto table = parse_toml_file(options.config);
   if (!table) return table;
@@ -35,18 +50,11 @@ Result<toml::table> read_program_config(const ProgramOptions& options) {
   return table;
 }
 
-bool is_plain_name(std::string_view name) {
-  return !name.empty() && name.size() <= 64 && name.front() != '.' && std::ranges::all_of(name, [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
-  });
-}
-
-std::string read_plain_name(TomlReader& read, std::string_view key, std::optional<std::string> fallback) {
-  std::string name = read.string(key, std::move(fallback));
-  if (!read.error() && !is_plain_name(name)) {
-    read.fault(key, fmt::format("expected 1 to 64 letters, digits, '_', '-' or '.' (not first), found \"{}\"", name));
-  }
-  return name;
+std::string read_id(TomlReader& read, std::string_view key, std::optional<std::string> fallback) {
+  std::string id = read.string(key, std::move(fallback));
+  if (read.error()) return id;
+  if (const auto valid = check_id("id", id); !valid) read.fault(key, valid.error().message);
+  return id;
 }
 
 ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults) {
@@ -64,10 +72,26 @@ ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults) {
   return config;
 }
 
+std::string read_choice(TomlReader& read, std::string_view key, std::initializer_list<std::string_view> choices,
+                        std::optional<std::string> fallback) {
+  std::string value = read.string(key, std::move(fallback));
+  if (!read.error() && std::ranges::find(choices, value) == choices.end()) {
+    std::string expected;
+    for (const std::string_view choice : choices) expected.append(expected.empty() ? "" : ", ").append(choice);
+    read.fault(key, fmt::format("expected one of {}; found \"{}\"", expected, value));
+  }
+  return value;
+}
+
 std::string toml_text(std::string_view text) {
   std::ostringstream out;
   out << toml::value<std::string>(std::string(text));
   return out.str();
+}
+
+std::string toml_number(double number) {
+  const std::string text = fmt::format("{}", number);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
 }
 
 std::string toml_list(const std::vector<std::string>& texts) {

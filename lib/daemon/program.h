@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,19 +26,29 @@ struct ProgramOptions {
 std::optional<int> parse_program_options(int argc, char** argv, const std::string& name, const std::string& purpose,
                                          ProgramOptions& options);
 
+/// Runs the program and gives its exit status; a failure is one line on stderr.
+int exit_status_of(const std::string& name, const std::function<Result<void>()>& run);
+
 /// The config file with `--set` applied over it.
 Result<toml::table> read_program_config(const ProgramOptions& options);
 
-/// Sites, lines, cameras and sessions become chunks of keys and names of files: 1 to 64 letters, digits, '_', '-' or
-/// '.', the last not first.
-bool is_plain_name(std::string_view name);
-std::string read_plain_name(TomlReader& read, std::string_view key, std::optional<std::string> fallback);
+/// An id (site, line, camera) that becomes a chunk of a key: `check_id` of lib/wire/keys.h.
+std::string read_id(TomlReader& read, std::string_view key, std::optional<std::string> fallback);
 
 /// `zenoh.connect` and `zenoh.listen`; an endpoint reads "tcp/<address>:<port>" (tcp, udp or tls).
 ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults);
 
-/// A TOML string or list for --print-config.
+/// One of a few words.
+std::string read_choice(TomlReader& read, std::string_view key, std::initializer_list<std::string_view> choices,
+                        std::optional<std::string> fallback);
+/// The edge methods of contract section 3, and the levels of lib/log.
+inline constexpr std::initializer_list<std::string_view> kMethods = {"best",    "orientation", "magnitude", "combined",
+                                                                    "uniform", "none",        "pixel"};
+inline constexpr std::initializer_list<std::string_view> kLogLevels = {"trace", "debug", "info", "warning", "error", "off"};
+
+/// A TOML string, number or list for --print-config.
 std::string toml_text(std::string_view text);
+std::string toml_number(double number);
 std::string toml_list(const std::vector<std::string>& texts);
 
 }  // namespace imprint

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -13,6 +14,7 @@ struct Frame {
   std::string source;  ///< file or device, for messages
   std::int64_t sensor_time_ns = 0;
   std::uint64_t sequence = 0;
+  std::vector<std::string> warnings;  ///< what the capture noticed, for the imprint
 };
 
 }  // namespace imprint

@@ -1,0 +1,44 @@
+#include "fusion/fusion_config.h"
+
+#include <algorithm>
+
+#include "lib/daemon/program.h"
+
+namespace imprint {
+
+Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const toml::table& table) {
+  FusionConfig config;
+  TomlReader read(path, table);
+  read.only({"fusion.site", "fusion.line", "fusion.rig", "fusion.database", "fusion.result_dir", "fusion.deadline_s",
+             "fusion.method", "fusion.log_level", "zenoh.connect", "zenoh.listen", "page.address", "page.port"});
+  config.site = read_id(read, "fusion.site", config.site);
+  config.line = read_id(read, "fusion.line", config.line);
+  config.rig = read.path("fusion.rig");
+  config.database = read.path("fusion.database", std::filesystem::absolute(path).parent_path() / config.database);
+  config.result_dir = read.path("fusion.result_dir", config.result_dir);
+  config.assembler.deadline_s = read.number("fusion.deadline_s", config.assembler.deadline_s);
+  config.method = read_choice(read, "fusion.method", kMethods, config.method);
+  config.log_level = read_choice(read, "fusion.log_level", kLogLevels, config.log_level);
+  config.zenoh = read_zenoh_section(read, config.zenoh);
+  config.page.address = read.string("page.address", config.page.address);
+  config.page.port = static_cast<int>(std::clamp<std::int64_t>(read.integer("page.port", config.page.port), -1, 65536));
+  if (const auto valid = config.assembler.validate(); !valid) read.fault("fusion.deadline_s", valid.error().message);
+  if (const auto valid = config.page.validate(); !valid) read.fault("page.port", valid.error().message);
+  if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
+    read.fault("zenoh.listen", "no endpoint here nor in zenoh.connect: no camera could reach this program");
+  }
+  if (const auto error = read.error()) return pass_on(*error);
+  return config;
+}
+
+std::string to_toml(const FusionConfig& config) {
+  return fmt::format(
+      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmethod = {}\nlog_level = {}\n\n"
+      "[zenoh]\nlisten = {}\nconnect = {}\n\n[page]\naddress = {}\nport = {}\n",
+      toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()), toml_text(config.database.string()),
+      config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
+      toml_number(config.assembler.deadline_s), toml_text(config.method), toml_text(config.log_level),
+      toml_list(config.zenoh.listen), toml_list(config.zenoh.connect), toml_text(config.page.address), config.page.port);
+}
+
+}  // namespace imprint

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "fusion/receive/observation_assembler.h"
+#include "fusion/serve/page_server.h"
+#include "lib/config/toml_file.h"
+#include "lib/result/result.h"
+#include "lib/transport/transport.h"
+
+namespace imprint {
+
+/// `fusion.toml`; every key with unit and default in docs/configuration.md.
+struct FusionConfig {
+  std::string site = "plant";
+  std::string line = "L1";
+  std::filesystem::path rig;
+  std::filesystem::path database = "imprint.db";
+  std::filesystem::path result_dir;  // empty: none
+  std::string method = "best";
+  std::string log_level = "info";
+  AssemblerConfig assembler;
+  ZenohConfig zenoh{.connect = {}, .listen = {"tcp/127.0.0.1:7447"}, .router = true};
+  PageConfig page;
+};
+
+/// Reads the table of `fusion.toml`; `path` is what relative paths and messages refer to.
+Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const toml::table& table);
+
+/// The effective config in the file's own form.
+std::string to_toml(const FusionConfig& config);
+
+}  // namespace imprint

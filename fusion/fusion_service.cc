@@ -1,0 +1,364 @@
+#include "fusion/fusion_service.h"
+
+#include <algorithm>
+
+#include "lib/config/atomic_file.h"
+#include "lib/log/log.h"
+
+namespace imprint {
+namespace {
+
+constexpr std::size_t kMaxQueued = 2048;
+constexpr std::size_t kMaxQueuedQueries = 64;
+constexpr std::size_t kMaxMessageBytes = 64 * 1024;  // sixteen times the largest imprint
+constexpr std::size_t kMaxInOneGo = 256;             // messages before deadlines are looked at again
+constexpr std::size_t kImprintHistory = 256;         // asked of each node on start
+constexpr std::size_t kTriggerHistory = 16;
+constexpr std::size_t kPublishedSessions = 16;       // whose last result a late watcher still gets
+constexpr auto kIdleWait = std::chrono::seconds(1);
+constexpr auto kRetryWait = std::chrono::milliseconds(500);
+
+std::int64_t wall_clock_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+std::string parameter(std::string_view parameters, std::string_view name) {
+  while (!parameters.empty()) {
+    const auto end = std::min(parameters.find(';'), parameters.size());
+    const std::string_view pair = parameters.substr(0, end);
+    if (pair.starts_with(name) && pair.size() > name.size() && pair[name.size()] == '=') {
+      return std::string(pair.substr(name.size() + 1));
+    }
+    parameters.remove_prefix(std::min(end + 1, parameters.size()));
+  }
+  return {};
+}
+
+std::vector<std::string> camera_ids(const Rig& rig) {
+  std::vector<std::string> ids;
+  for (const CameraModel& camera : rig.cameras) ids.push_back(camera.id);
+  return ids;
+}
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+}  // namespace
+
+FusionService::FusionService(FusionConfig config, Rig rig, Transport& transport, SessionStore& store, LineBoard& board,
+                             Fuse fuse)
+    : config_(std::move(config)),
+      rig_(std::move(rig)),
+      transport_(transport),
+      store_(store),
+      board_(board),
+      fuse_(std::move(fuse)),
+      assembler_(camera_ids(rig_), config_.assembler),
+      queue_(std::make_shared<BoundedQueue<Message>>(kMaxQueued)),
+      queries_(std::make_shared<BoundedQueue<std::shared_ptr<Query>>>(kMaxQueuedQueries)) {}
+
+Result<void> FusionService::start() {
+  auto keys = Keys::of(config_.site, config_.line);
+  if (!keys) return pass_on(keys.error());
+  keys_ = std::make_shared<Keys>(std::move(*keys));
+  if (const auto latest = store_.latest_result(); latest && latest->has_value()) board_.set_result(**latest);
+  if (auto subscribed = subscribe(); !subscribed) {
+    declarations_.clear();
+    return subscribed;
+  }
+  worker_ = std::thread([this] { work(); });
+  answerer_ = std::thread([this] { answer_queries(); });
+  return {};
+}
+
+Result<void> FusionService::subscribe() {
+  auto trigger_publisher = transport_.publish(keys_->trigger(), {.traffic = Traffic::command, .history = 0});
+  if (!trigger_publisher) return pass_on(trigger_publisher.error());
+  trigger_publisher_ = std::move(*trigger_publisher);
+
+  const auto on_miss = [this](std::string_view source, std::uint32_t count) {
+    board_.count("missed", count);
+    spdlog::warn("{} message(s) of {} were lost on the way", count, source);
+  };
+  const auto on_liveness = [queue = queue_](std::string_view key, bool alive) {
+    queue->push({alive ? Kind::alive : Kind::gone, std::string(key), {}});
+  };
+  const auto on_query = [queries = queries_](std::shared_ptr<Query> query) {
+    if (!queries->push(query)) (void)query->reply_error("busy");
+  };
+  Result<std::unique_ptr<Declaration>> declared[] = {
+      transport_.subscribe(keys_->trigger(), {.history = kTriggerHistory}, queueing(Kind::trigger), on_miss),
+      transport_.subscribe(keys_->imprint(), {.history = kImprintHistory}, queueing(Kind::imprint), on_miss),
+      transport_.subscribe(keys_->health(), {.history = 0}, queueing(Kind::health)),
+      transport_.watch_liveness(keys_->alive(), on_liveness),
+      transport_.answer(keys_->fusion_service("status"), on_query),
+      transport_.answer(keys_->fusion_service("result"), on_query),
+      transport_.announce(keys_->fusion_alive()),
+  };
+  for (auto& declaration : declared) {
+    if (!declaration) return pass_on(declaration.error());
+    declarations_.push_back(std::move(*declaration));
+  }
+  return {};
+}
+
+SampleCallback FusionService::queueing(Kind kind) {
+  return [this, kind, queue = queue_](const Sample& sample) {
+    if (sample.payload.size() > kMaxMessageBytes) {
+      board_.count("malformed");
+    } else if (!queue->push({kind, sample.key, sample.payload})) {
+      board_.count("dropped");
+    }
+  };
+}
+
+void FusionService::stop() {
+  if (stopping_.exchange(true)) return;
+  declarations_.clear();  // nothing new comes in, then what is there is stored
+  queue_->close();
+  queries_->drop();
+  if (worker_.joinable()) worker_.join();
+  if (answerer_.joinable()) answerer_.join();
+}
+
+void FusionService::work() {
+  const auto unfinished = store_.unfinished(static_cast<int>(config_.assembler.max_sessions));
+  if (!unfinished) spdlog::error("{}", unfinished.error().message);
+  for (const std::string& session : unfinished.value_or(std::vector<std::string>{})) {
+    spdlog::info("session {}: not finished when this program last ended; taken up again", session);
+    recall(session);
+    show_session(session);
+  }
+  evaluate();
+  while (!queue_->finished()) {
+    const Time idle_until = std::chrono::steady_clock::now() + kIdleWait;
+    auto message = queue_->pop_until(std::min(assembler_.next_deadline().value_or(idle_until), idle_until));
+    for (std::size_t i = 0; message && i < kMaxInOneGo; ++i) {
+      handle(*message);
+      message = queue_->try_pop();
+    }
+    if (message) handle(*message);
+    evaluate();
+  }
+}
+
+void FusionService::handle(const Message& message) {
+  switch (message.kind) {
+    case Kind::trigger: return receive_trigger(message);
+    case Kind::imprint: return receive_imprint(message);
+    case Kind::health: return receive_health(message);
+    case Kind::alive:
+    case Kind::gone:
+      if (const auto camera = keys_->camera_of(message.key)) receive_liveness(*camera, message.kind == Kind::alive);
+  }
+}
+
+void FusionService::receive_trigger(const Message& message) {
+  const auto trigger = decode_trigger(message.bytes);
+  if (!trigger) return malformed(message, trigger.error().message);
+  if (const auto valid = check_id("session", trigger->session); !valid) return malformed(message, valid.error().message);
+  if (const auto bounds = assembler_.check(*trigger); !bounds) return malformed(message, bounds.error().message);
+  bool is_new = false;
+  if (!surely<bool>([&] { return store_.add_trigger(*trigger, message.bytes, wall_clock_ns()); }, is_new) || !is_new) return;
+  spdlog::info("session {} observation {}: triggered, rotation {} deg", trigger->session, trigger->observation,
+               trigger->rotation_deg);
+  if (assembler_.knows(trigger->session)) {
+    (void)assembler_.add(*trigger, std::chrono::steady_clock::now());  // within bounds, as checked
+  } else {
+    recall(trigger->session);
+  }
+  show_session(trigger->session);
+}
+
+void FusionService::receive_imprint(const Message& message) {
+  const auto imprint = decode_imprint(message.bytes);
+  if (!imprint) return malformed(message, imprint.error().message);
+  if (keys_->camera_of(message.key) != imprint->camera_id) {
+    return malformed(message, fmt::format("carries an imprint of camera {}", imprint->camera_id));
+  }
+  if (const auto valid = check_id("session", imprint->session); !valid) return malformed(message, valid.error().message);
+  if (rig_.find_camera(imprint->camera_id) == nullptr || imprint->observation >= config_.assembler.max_observations) {
+    board_.count("refused");
+    spdlog::warn("imprint of camera {} for session {} observation {} refused: {}", imprint->camera_id, imprint->session,
+                 imprint->observation,
+                 rig_.find_camera(imprint->camera_id) == nullptr ? "the rig has no such camera" : "no such observation");
+    return;
+  }
+  bool is_new = false;
+  if (!surely<bool>([&] { return store_.add_imprint(*imprint, message.bytes, wall_clock_ns()); }, is_new)) return;
+  board_.count(is_new ? "imprints" : "repeated");
+  if (!is_new) return;
+  const Time now = std::chrono::steady_clock::now();
+  board_.note_imprint(*imprint, now);
+  if (assembler_.knows(imprint->session)) {
+    const Arrival arrival = assembler_.add(*imprint, now);
+    if (arrival == Arrival::surplus) board_.count("surplus");
+    spdlog::info("session {} observation {}: imprint of {} {}{}", imprint->session, imprint->observation, imprint->camera_id,
+                 arrival_name(arrival), imprint->failure.empty() ? "" : "; it failed: " + imprint->failure);
+  } else {
+    spdlog::info("session {} observation {}: imprint of {}", imprint->session, imprint->observation, imprint->camera_id);
+    recall(imprint->session);
+  }
+  show_session(imprint->session);
+}
+
+void FusionService::receive_health(const Message& message) {
+  const auto health = decode_health(message.bytes);
+  if (!health) return malformed(message, health.error().message);
+  if (keys_->camera_of(message.key) != health->camera_id) {
+    return malformed(message, fmt::format("carries the health of camera {}", health->camera_id));
+  }
+  board_.set_health(*health, std::chrono::steady_clock::now());
+}
+
+void FusionService::receive_liveness(const std::string& camera_id, bool alive) {
+  if (rig_.find_camera(camera_id) == nullptr) {
+    if (alive) spdlog::warn("camera {} has connected, but the rig has no such camera", camera_id);
+    return;
+  }
+  spdlog::info("camera {}: {}", camera_id, alive ? "connected" : "connection lost");
+  assembler_.set_alive(camera_id, alive);
+  board_.set_alive(camera_id, alive);
+  if (!alive) return;
+  for (Trigger trigger : assembler_.open_triggers(camera_id)) {
+    trigger.fire_at_ns = 0;  // that moment has passed
+    spdlog::info("session {} observation {}: trigger sent again for {}", trigger.session, trigger.observation, camera_id);
+    if (auto sent = trigger_publisher_->put(encode_trigger(trigger)); !sent) spdlog::warn("{}", sent.error().message);
+  }
+}
+
+void FusionService::recall(const std::string& session) {
+  const auto messages = store_.messages(session);
+  if (!messages) {
+    spdlog::error("session {}: {}", session, messages.error().message);
+    return;
+  }
+  const Time now = std::chrono::steady_clock::now();
+  const std::int64_t wall_now_ns = wall_clock_ns();
+  // Older than the deadline is as good as the deadline; a clock that was set back makes nothing younger than now.
+  const auto oldest_ns = static_cast<std::int64_t>(config_.assembler.deadline_s * 1e9);
+  for (const StoredMessage& message : *messages) {
+    const std::int64_t age_ns = std::clamp<std::int64_t>(wall_now_ns - message.received_ns, 0, oldest_ns);
+    const Time then = now - std::chrono::duration_cast<Time::duration>(std::chrono::nanoseconds(age_ns));
+    if (message.is_trigger) {
+      if (const auto trigger = decode_trigger(message.bytes)) (void)assembler_.add(*trigger, then);
+    } else if (const auto imprint = decode_imprint(message.bytes)) {
+      assembler_.add(*imprint, then);
+    }
+  }
+}
+
+void FusionService::evaluate() {
+  for (const std::string& session : assembler_.settle(std::chrono::steady_clock::now())) make_result(session);
+}
+
+void FusionService::make_result(const std::string& session) {
+  StoredResult result;
+  result.session = session;
+  result.complete = assembler_.complete(session);
+  result.made_ns = wall_clock_ns();
+  try {
+    auto measurement = fuse_(assembler_.observations(session), rig_.forging, session, config_.method);
+    if (measurement) {
+      const auto warnings = assembler_.warnings(session);
+      measurement->warnings.insert(measurement->warnings.end(), warnings.begin(), warnings.end());
+      result.json = to_json(*measurement).dump();
+    } else {
+      result.error = measurement.error().message;
+    }
+  } catch (const std::exception& error) {  // a fault of ours or of a library must not end the line's only fusion
+    result.error = fmt::format("unexpected: {}", error.what());
+  }
+  if (!surely<std::int64_t>([&] { return store_.put_result(result); }, result.revision)) return;
+  if (result.error.empty()) {
+    spdlog::info("session {}: result {} stored, {}", session, result.revision, result.complete ? "complete" : "not complete yet");
+  } else {
+    spdlog::warn("session {}: no measurement: {}", session, result.error);
+  }
+  board_.count("results");
+  write_result_file(result);
+  announce(result);
+  board_.set_result(result);
+  show_session(session);
+}
+
+void FusionService::announce(const StoredResult& result) {
+  auto publisher = result_publishers_.find(result.session);
+  if (publisher == result_publishers_.end()) {
+    auto opened = transport_.publish(keys_->result(result.session), {.traffic = Traffic::imprint, .history = 1});
+    if (!opened) {
+      spdlog::error("session {}: {}", result.session, opened.error().message);
+      return;
+    }
+    if (published_sessions_.size() >= kPublishedSessions) {
+      result_publishers_.erase(published_sessions_.front());
+      published_sessions_.pop_front();
+    }
+    published_sessions_.push_back(result.session);
+    publisher = result_publishers_.emplace(result.session, std::move(*opened)).first;
+  }
+  const auto sent = publisher->second->put(encode_result({result.session, result.complete, result.error, result.json}));
+  if (!sent) spdlog::error("session {}: {}", result.session, sent.error().message);
+}
+
+void FusionService::write_result_file(const StoredResult& result) {
+  if (config_.result_dir.empty() || result.json.empty()) return;
+  const std::filesystem::path folder = config_.result_dir / result.session;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    board_.set_alarm("result_dir", fmt::format("{}: {}", folder.string(), error.message()));
+    return;
+  }
+  const auto written = write_file_atomically(folder / "result.json", result.json + "\n");
+  board_.set_alarm("result_dir", written ? "" : written.error().message);
+}
+
+void FusionService::show_session(const std::string& session) {
+  board_.set_session({session, assembler_.expected(session), assembler_.complete(session), assembler_.states(session)});
+}
+
+void FusionService::malformed(const Message& message, const std::string& why) {
+  board_.count("malformed");
+  spdlog::warn("{}: message of {} bytes dropped: {}", message.key, message.bytes.size(), why);
+}
+
+template <class T>
+bool FusionService::surely(const std::function<Result<T>()>& write, T& outcome) {
+  for (bool alarmed = false;;) {
+    if (auto done = write()) {
+      if (alarmed) board_.set_alarm("store", "");
+      outcome = *done;
+      return true;
+    } else if (!alarmed) {
+      alarmed = true;
+      board_.set_alarm("store", done.error().message);
+      spdlog::error("{}; tried again until it succeeds", done.error().message);
+    }
+    if (stopping_) return false;
+    std::this_thread::sleep_for(kRetryWait);
+  }
+}
+
+void FusionService::answer_queries() {
+  while (auto query = queries_->pop()) {
+    Result<void> replied;
+    if ((*query)->key() == keys_->fusion_service("status")) {
+      replied = (*query)->reply(bytes_of(board_.status(std::chrono::steady_clock::now()).dump()));
+    } else {
+      const std::string session = parameter((*query)->parameters(), "session");
+      const auto result = session.empty() ? store_.latest_result() : store_.result(session);
+      if (!result) {
+        replied = (*query)->reply_error(result.error().message);
+      } else if (!result->has_value()) {
+        replied = (*query)->reply_error(session.empty() ? "no result yet" : "no result of session " + session);
+      } else {
+        replied = (*query)->reply(bytes_of(to_json(**result).dump()));
+      }
+    }
+    if (!replied) spdlog::warn("{}", replied.error().message);
+  }
+}
+
+}  // namespace imprint

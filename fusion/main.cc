@@ -1,0 +1,82 @@
+#include <iostream>
+
+#include "fusion/fusion_config.h"
+#include "fusion/fusion_service.h"
+#include "fusion/serve/page_server.h"
+#include "fusion/store/session_store.h"
+#include "lib/daemon/program.h"
+#include "lib/daemon/stop_signal.h"
+#include "lib/daemon/systemd_notice.h"
+#include "lib/log/log.h"
+
+namespace imprint {
+namespace {
+
+constexpr auto kIdleWait = std::chrono::milliseconds(60'000);
+
+void attend(StopSignal& stop) {
+  const auto watchdog = watchdog_period();
+  while (!stop.wait_for(watchdog.value_or(kIdleWait))) notify_watchdog();
+}
+
+Result<void> check_store(const FusionConfig& config) {
+  std::error_code ignored;
+  if (std::filesystem::exists(config.database, ignored)) {
+    if (const auto store = SessionStore::open(config.database); !store) return pass_on(store.error());
+  } else if (!std::filesystem::is_directory(config.database.parent_path(), ignored)) {
+    return invalid_input("fusion.database: {}: the folder does not exist", config.database.string());
+  }
+  return {};
+}
+
+Result<void> run(const ProgramOptions& options) {
+  StopSignal stop;
+  const auto table = read_program_config(options);
+  if (!table) return pass_on(table.error());
+  const auto config = read_fusion_config(options.config, *table);
+  if (!config) return pass_on(config.error());
+  if (options.print_config) {
+    std::cout << to_toml(*config);
+    return {};
+  }
+  const auto rig = read_rig(config->rig);
+  if (!rig) return pass_on(rig.error());
+  if (options.check) {
+    if (auto checked = check_store(*config); !checked) return checked;
+    std::cout << options.config.string() << ": OK\n";
+    return {};
+  }
+  if (auto opened = open_log("imprint-fusion", config->log_level); !opened) return opened;
+  const auto store = SessionStore::open(config->database);
+  if (!store) return pass_on(store.error());
+
+  std::vector<std::string> camera_ids;
+  for (const CameraModel& camera : rig->cameras) camera_ids.push_back(camera.id);
+  LineBoard board({config->site, config->line, config->method, IMPRINT_VERSION}, camera_ids, std::chrono::steady_clock::now());
+  const auto page = PageServer::start(config->page, board, **store);
+  if (!page) return pass_on(page.error());
+  auto transport = open_zenoh(config->zenoh);
+  if (!transport) return pass_on(transport.error());
+  FusionService service(*config, *rig, **transport, **store, board, fuse);
+  if (auto started = service.start(); !started) return started;
+  spdlog::info("fusion of {}/{} ready, {} cameras, page http://{}:{}/", config->site, config->line, camera_ids.size(),
+               config->page.address, (*page)->port());
+  notify_ready("fusion ready");
+  attend(stop);
+  notify_stopping();
+  service.stop();
+  spdlog::info("fusion stopped");
+  return {};
+}
+
+}  // namespace
+}  // namespace imprint
+
+int main(int argc, char** argv) {
+  imprint::ProgramOptions options;
+  if (const auto status = imprint::parse_program_options(
+          argc, argv, "imprint-fusion", "Fuses the imprints of a line's cameras into the geometry of the forging", options)) {
+    return *status;
+  }
+  return imprint::exit_status_of("imprint-fusion", [&] { return imprint::run(options); });
+}

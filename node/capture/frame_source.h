@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "lib/result/result.h"
+#include "node/capture/frame.h"
+
+namespace imprint {
+
+/// Which picture is wanted: what the trigger said.
+struct CaptureRequest {
+  std::string session;
+  int observation = 0;
+  double rotation_deg = 0.0;
+};
+
+/// Where a node's frames come from. Everything that is hardware, a file or a simulation is behind this interface.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  /// One frame, taken now. Fails (job_failed or invalid_input) naming the device or the file; may be called again.
+  virtual Result<Frame> capture(const CaptureRequest& request) = 0;
+};
+
+}  // namespace imprint

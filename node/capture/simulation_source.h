@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "lib/result/result.h"
+#include "node/capture/frame_source.h"
+
+namespace imprint {
+
+/// A simulated camera: renders the triggered observation of a scene file, as `imprint simulate` would have.
+/// Fails (invalid_input) when the scene cannot be read.
+Result<std::unique_ptr<FrameSource>> open_simulation_source(const std::filesystem::path& scene, const std::string& camera_id);
+
+}  // namespace imprint

@@ -1,0 +1,175 @@
+#include "node/node_service.h"
+
+#include <algorithm>
+
+#include "lib/log/log.h"
+#include "lib/wire/keys.h"
+
+namespace imprint {
+namespace {
+
+using std::chrono::steady_clock;
+using std::chrono::system_clock;
+
+constexpr std::size_t kMaxQueuedTriggers = 64;
+constexpr std::size_t kMaxTriggerBytes = 4096;
+constexpr std::size_t kRememberedAnswers = 1024;
+constexpr auto kMaxLead = std::chrono::seconds(60);  // a moment further ahead means clocks that disagree
+
+std::int64_t nanoseconds(auto duration) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count();
+}
+
+std::int64_t wall_clock_ns() { return nanoseconds(system_clock::now().time_since_epoch()); }
+
+}  // namespace
+
+NodeService::NodeService(NodeConfig config, FrameSource& source, ProcessFrame process, Transport& transport)
+    : config_(std::move(config)),
+      source_(source),
+      process_(std::move(process)),
+      transport_(transport),
+      triggers_(std::make_shared<BoundedQueue<Bytes>>(kMaxQueuedTriggers)) {
+  health_.camera_id = config_.camera_id;
+  health_.version = IMPRINT_VERSION;
+}
+
+Result<void> NodeService::start() {
+  const auto keys = Keys::of(config_.site, config_.line);
+  if (!keys) return pass_on(keys.error());
+  auto publisher = ImprintPublisher::open(transport_, *keys, config_.camera_id, make_boot_id());
+  if (!publisher) return pass_on(publisher.error());
+  publisher_ = std::move(*publisher);
+
+  auto subscribed = transport_.subscribe(keys->trigger(), {.history = 0}, [queue = triggers_](const Sample& sample) {
+    if (sample.payload.size() > kMaxTriggerBytes || !queue->push(sample.payload)) {
+      spdlog::error("{}: trigger of {} bytes dropped: too large, or more than {} are waiting", sample.key,
+                    sample.payload.size(), kMaxQueuedTriggers);
+    }
+  });
+  if (!subscribed) return pass_on(subscribed.error());
+  declarations_.push_back(std::move(*subscribed));
+
+  worker_ = std::thread([this] { work(); });
+
+  // Last: who sees this token may trigger.
+  auto token = transport_.announce(keys->alive(config_.camera_id));
+  if (!token) return pass_on(token.error());
+  declarations_.push_back(std::move(*token));
+  send_health();
+  return {};
+}
+
+void NodeService::stop() {
+  {
+    const std::lock_guard lock(stop_mutex_);
+    if (std::exchange(stopping_, true)) return;
+  }
+  stop_changed_.notify_all();
+  triggers_->drop();
+  if (worker_.joinable()) worker_.join();
+  declarations_.clear();
+}
+
+bool NodeService::stuck(std::chrono::seconds limit) const {
+  const std::int64_t since_ns = busy_since_ns_;
+  return since_ns != 0 && nanoseconds(steady_clock::now().time_since_epoch()) - since_ns > nanoseconds(limit);
+}
+
+void NodeService::work() {
+  while (const auto message = triggers_->pop()) receive(*message);
+}
+
+void NodeService::receive(const Bytes& message) {
+  const auto trigger = decode_trigger(message);
+  if (!trigger) {
+    spdlog::warn("trigger of {} bytes dropped: {}", message.size(), trigger.error().message);
+    return;
+  }
+  const std::pair answer(trigger->session, trigger->observation);
+  if (std::ranges::find(answered_, answer) != answered_.end()) {
+    spdlog::debug("session {} observation {}: already answered", trigger->session, trigger->observation);
+    return;
+  }
+  std::vector<std::string> warnings;
+  if (!await(*trigger, warnings)) return;
+
+  busy_since_ns_ = nanoseconds(steady_clock::now().time_since_epoch());
+  Imprint imprint = make_imprint(*trigger);
+  busy_since_ns_ = 0;
+  imprint.warnings.insert(imprint.warnings.end(), warnings.begin(), warnings.end());
+  if (imprint.failure.empty()) {
+    if (answered_.size() >= kRememberedAnswers) answered_.pop_front();
+    answered_.push_back(answer);
+  }
+  note(imprint);
+}
+
+bool NodeService::await(const Trigger& trigger, std::vector<std::string>& warnings) {
+  const auto lead = std::chrono::nanoseconds(trigger.fire_at_ns - wall_clock_ns());
+  std::unique_lock lock(stop_mutex_);
+  if (trigger.fire_at_ns == 0 || lead <= std::chrono::nanoseconds(0)) return !stopping_;
+  if (lead > kMaxLead) {
+    warnings.push_back(fmt::format("triggered for {} s from now; fired at once, check the clocks",
+                                   std::chrono::duration_cast<std::chrono::seconds>(lead).count()));
+    return !stopping_;
+  }
+  return !stop_changed_.wait_for(lock, lead, [this] { return stopping_; });
+}
+
+Imprint NodeService::make_imprint(const Trigger& trigger) {
+  Imprint imprint;
+  std::int64_t sensor_time_ns = wall_clock_ns();
+  try {
+    auto frame = source_.capture({trigger.session, static_cast<int>(trigger.observation), trigger.rotation_deg});
+    if (frame) {
+      if (frame->sensor_time_ns != 0) sensor_time_ns = frame->sensor_time_ns;
+      ProcessedFrame processed = process_(*frame);
+      imprint = std::move(processed.imprint);
+      if (processed.error && imprint.failure.empty()) imprint.failure = processed.error->message;
+      imprint.warnings.insert(imprint.warnings.end(), frame->warnings.begin(), frame->warnings.end());
+    } else {
+      imprint.failure = frame.error().message;
+    }
+  } catch (const std::exception& error) {  // a fault of ours or of a library: this frame fails, the node goes on
+    imprint = {};
+    imprint.failure = fmt::format("unexpected: {}", error.what());
+  }
+  imprint.camera_id = config_.camera_id;
+  imprint.session = trigger.session;
+  imprint.observation = trigger.observation;
+  imprint.rotation_deg = trigger.rotation_deg;
+  imprint.sensor_time_ns = sensor_time_ns;
+  imprint.method = config_.method;
+  return imprint;
+}
+
+void NodeService::note(const Imprint& imprint) {
+  {
+    const std::lock_guard lock(publish_mutex_);
+    if (auto sent = publisher_->send(imprint); !sent) spdlog::error("imprint not sent: {}", sent.error().message);
+    ++health_.frames;
+    if (!imprint.failure.empty()) ++health_.failed_frames;
+    health_.last_error = imprint.failure;
+    health_.targets_seen = imprint.quality.targets_seen;
+    health_.reprojection_rms_px = imprint.quality.reprojection_rms_px;
+    health_.contrast = imprint.quality.contrast;
+  }
+  if (imprint.failure.empty()) {
+    spdlog::info("session {} observation {}: imprint sent, {} targets, reprojection rms {:.3f} px, coverage {:.0f} %",
+                 imprint.session, imprint.observation, imprint.quality.targets_used, imprint.quality.reprojection_rms_px,
+                 100.0 * imprint.quality.edge_coverage);
+  } else {
+    spdlog::warn("session {} observation {}: no imprint: {}", imprint.session, imprint.observation, imprint.failure);
+  }
+  send_health();
+}
+
+void NodeService::send_health() {
+  const std::lock_guard lock(publish_mutex_);
+  if (!publisher_) return;
+  health_.time_ns = wall_clock_ns();
+  if (auto sent = publisher_->send(health_); !sent) spdlog::warn("health not sent: {}", sent.error().message);
+}
+
+}  // namespace imprint
