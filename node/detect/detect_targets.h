@@ -23,6 +23,7 @@ struct DetectConfig;  // in detect_config.h
 
 /// The coded targets of an image, each id at most once, by ascending id. Finding none is an empty vector.
 /// `image`: one channel, 8 or 16 bit. Method: [A] 2.3.1 to 2.3.8.
-std::vector<DetectedTarget> detect_targets(const cv::Mat& image, const TargetLibrary& library, const DetectConfig& config);
+std::vector<DetectedTarget> detect_targets(const cv::Mat& image, const TargetLibrary& library,
+                                           const DetectConfig& config);
 
 }  // namespace imprint

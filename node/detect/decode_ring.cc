@@ -1,0 +1,170 @@
+#include "node/detect/decode_ring.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "lib/targets/code_distance.h"
+
+namespace imprint {
+namespace {
+
+constexpr double reading_sigma = 0.12;      // unevenness of paint and light over a target, ours
+constexpr double cover_probability = 0.05;  // that a bit shows something else, ours
+constexpr double cover_density = 0.4;       // of a reading that may be anything from -0.5 to 2
+constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
+constexpr double max_fit = 0.22;            // rms of the known bits; rings in clutter have levels at random
+
+int bit_of(std::uint32_t code, int bits, int index) {
+  return static_cast<int>((code >> ((2 * bits - 1 - index) % bits)) & 1U);
+}
+
+double predicted(const BitResponse& response, int before, int own, int after) {
+  return response.floor + response.own * own + response.beside * (before + after);
+}
+
+double log_likelihood(double reading, double expected, double sigma) {
+  if (std::isnan(reading)) return std::log(cover_probability * cover_density);
+  const double z = (reading - expected) / sigma;
+  const double normal = std::exp(-0.5 * z * z) / (sigma * std::sqrt(2.0 * std::numbers::pi));
+  return std::log((1.0 - cover_probability) * normal + cover_probability * cover_density);
+}
+
+double sigma_of(const RingScan& scan) { return std::hypot(reading_sigma, scan.noise); }
+
+/// Log likelihood of stretches of a code, so that a whole code costs few look-ups: each stretch of five bits depends
+/// on those and their two neighbours.
+class StretchTables {
+ public:
+  StretchTables(const RingScan& scan, int bits) : bits_(bits) {
+    const double sigma = sigma_of(scan);
+    for (int first = 0; first < bits; first += stretch) {
+      const int length = std::min(stretch, bits - first);
+      std::vector<double> table(std::size_t{1} << (length + 2));
+      for (std::size_t pattern = 0; pattern < table.size(); ++pattern) {
+        for (int i = 0; i < length; ++i) {
+          const auto bit = [&](int k) { return static_cast<int>((pattern >> (length + 1 - k)) & 1U); };
+          const auto at = static_cast<std::size_t>(first + i);
+          table[pattern] +=
+              log_likelihood(scan.reading[at], predicted(scan.response[at], bit(i), bit(i + 1), bit(i + 2)), sigma);
+        }
+      }
+      tables_.push_back(std::move(table));
+    }
+  }
+
+  [[nodiscard]] double of(std::uint32_t code) const {
+    // The ring unrolled with its last bit before and its first bit after.
+    const std::uint64_t last = code & 1U;
+    const std::uint64_t first = (code >> (bits_ - 1)) & 1U;
+    const std::uint64_t unrolled = (last << (bits_ + 1)) | (static_cast<std::uint64_t>(code) << 1U) | first;
+    double sum = 0.0;
+    for (std::size_t t = 0; t < tables_.size(); ++t) {
+      const int begin = static_cast<int>(t) * stretch;
+      const int length = std::min(stretch, bits_ - begin);
+      const int shift = bits_ - begin - length;
+      sum += tables_[t][(unrolled >> shift) & ((std::uint64_t{1} << (length + 2)) - 1)];
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr int stretch = 5;
+  int bits_;
+  std::vector<std::vector<double>> tables_;
+};
+
+}  // namespace
+
+RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
+    : bits_(library.bits),
+      max_unknown_(max_unknown),
+      min_distance_(smallest_distance(library.codes, library.bits)),
+      codes_(library.codes) {
+  least_white_ = bits_;
+  most_white_ = 0;
+  for (const TargetCode& code : codes_) {
+    least_white_ = std::min(least_white_, std::popcount(code.code));
+    most_white_ = std::max(most_white_, std::popcount(code.code));
+  }
+  const int correctable = (min_distance_ - 1) / 2;
+  const int hidden = static_cast<int>(max_unknown_ * bits_);
+  least_white_ = std::max(0, least_white_ - std::max(correctable, hidden));
+  most_white_ = std::min(bits_, most_white_ + std::max(correctable, hidden));
+}
+
+struct RingDecoder::Match {
+  double log_likelihood = -std::numeric_limits<double>::max();
+  int id = 0;
+  std::uint32_t code = 0;
+};
+
+DecodedRing RingDecoder::decode(const RingScan& scan) const {
+  const StretchTables tables(scan, bits_);
+  Match best;
+  Match second;
+  for (const TargetCode& code : codes_) {
+    Match match;
+    match.id = code.id;
+    for (int k = 0; k < bits_; ++k) {
+      const std::uint32_t turned = rotated(code.code, bits_, k);
+      const double value = tables.of(turned);
+      if (value > match.log_likelihood) {
+        match.log_likelihood = value;
+        match.code = turned;
+      }
+    }
+    if (match.log_likelihood > best.log_likelihood) {
+      second = best;
+      best = match;
+    } else if (match.log_likelihood > second.log_likelihood) {
+      second = match;
+    }
+  }
+  DecodedRing ring;
+  ring.id = best.id;
+  const double sigma = sigma_of(scan);
+  const double one_wrong_bit = log_likelihood(0.0, 0.0, sigma) - log_likelihood(1.0, 0.0, sigma);
+  ring.margin = codes_.size() < 2 ? bits_ : (best.log_likelihood - second.log_likelihood) / one_wrong_bit;
+  compare_bits(scan, best.code, ring);
+  ring.accepted = accepts(ring);
+  return ring;
+}
+
+void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const {
+  double sum = 0.0;
+  int known = 0;
+  for (int i = 0; i < bits_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const BitResponse& response = scan.response[at];
+    const int before = bit_of(code, bits_, i + bits_ - 1);
+    const int own = bit_of(code, bits_, i);
+    const int after = bit_of(code, bits_, i + 1);
+    const double limit = known_limit * std::max(response.own, 0.2) + 2.0 * scan.noise;
+    const double off = std::abs(scan.reading[at] - predicted(response, before, own, after));
+    const double other = std::abs(scan.reading[at] - predicted(response, before, 1 - own, after));
+    if (off <= limit) {
+      sum += off * off;
+      ++known;
+    } else if (other <= limit) {
+      ++ring.wrong;
+    } else {
+      ++ring.unknown;
+    }
+  }
+  ring.distance = ring.wrong + 0.5 * ring.unknown;
+  ring.fit = known > 0 ? std::sqrt(sum / known) : 1.0;
+}
+
+bool RingDecoder::accepts(const DecodedRing& ring) const {
+  if (ring.unknown > max_unknown_ * bits_ || ring.fit > max_fit) return false;
+  const bool corrected_for_sure = 2 * ring.wrong + ring.unknown < min_distance_;
+  constexpr double sure_margin = 1.7;  // in wrong bits: two, less what unevenness takes
+  const bool only_hidden = ring.wrong == 0 && ring.margin >= sure_margin;
+  constexpr double least_margin = 0.7;
+  return (corrected_for_sure && ring.margin >= least_margin) || only_hidden;
+}
+
+}  // namespace imprint

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/targets/target_library.h"
+#include "node/detect/scan_ring.h"
+
+namespace imprint {
+
+/// The best code for a scanned ring and how sure it is.
+struct DecodedRing {
+  int id = 0;
+  int wrong = 0;          ///< bits that show the other colour
+  int unknown = 0;        ///< bits that show neither colour (a cover, dirt, outside the image)
+  double distance = 0.0;  ///< wrong + unknown / 2, as [A] equation 14 counts
+  double margin = 0.0;    ///< log likelihood above the best other id, in units of one wrong bit
+  double fit = 0.0;       ///< rms difference between the readings of known bits and the code's
+  bool accepted = false;
+};
+
+/// Decodes rings by maximum likelihood over all codes and rotations of a library. Each bit's reading is normal about
+/// what the code predicts there, with its neighbours' blur, or, with a small probability, anything (dirt, cover): a
+/// bit that is neither colour then costs every code the same, a bit of the wrong colour only the codes it contradicts.
+class RingDecoder {
+ public:
+  RingDecoder(const TargetLibrary& library, double max_unknown);
+
+  /// The most likely code. It is accepted when the wrong and unknown bits can be corrected for sure
+  /// (2 wrong + unknown < distance of the library), or when nothing but unknown bits is amiss and the other codes are
+  /// ruled out by two bits or more; and when the known bits fit well.
+  [[nodiscard]] DecodedRing decode(const RingScan& scan) const;
+
+  /// Fewest and most white bits of a ring that could be accepted.
+  [[nodiscard]] int least_white() const { return least_white_; }
+  [[nodiscard]] int most_white() const { return most_white_; }
+  [[nodiscard]] int min_distance() const { return min_distance_; }
+
+ private:
+  struct Match;
+  [[nodiscard]] bool accepts(const DecodedRing& ring) const;
+  void compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const;
+
+  int bits_;
+  double max_unknown_;
+  int min_distance_;
+  int least_white_;
+  int most_white_;
+  std::vector<TargetCode> codes_;
+};
+
+}  // namespace imprint

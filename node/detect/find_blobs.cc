@@ -1,0 +1,63 @@
+#include "node/detect/find_blobs.h"
+
+#include <algorithm>
+
+#include <opencv2/imgproc.hpp>
+
+namespace imprint {
+namespace {
+
+constexpr int tile_px = 256;
+
+/// Strength of a pixel of the response, 8 or 16 bit.
+int strength(const cv::Mat& response, const cv::Point& p) {
+  return response.depth() == CV_16U ? response.at<std::uint16_t>(p) : response.at<std::uint8_t>(p);
+}
+
+/// Centre minus surround, zero where that is negative.
+cv::Mat blob_response(const cv::Mat& level) {
+  cv::Mat center;
+  cv::Mat surround;
+  cv::Mat response;
+  cv::GaussianBlur(level, center, {5, 5}, 1.0, 1.0, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(level, surround, {11, 11}, 2.4, 2.4, cv::BORDER_REPLICATE);
+  cv::subtract(center, surround, response);
+  return response;
+}
+
+void keep_strongest(std::vector<cv::Point>& points, std::size_t count, const cv::Mat& response) {
+  if (points.size() <= count) return;
+  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(count), points.end(),
+                   [&response](const cv::Point& a, const cv::Point& b) {
+                     const int strength_a = strength(response, a);
+                     const int strength_b = strength(response, b);
+                     if (strength_a != strength_b) return strength_a > strength_b;
+                     return a.y != b.y ? a.y < b.y : a.x < b.x;  // the same choice on every machine
+                   });
+  points.resize(count);
+}
+
+}  // namespace
+
+std::vector<cv::Point> find_blobs(const cv::Mat& level, double min_contrast, int per_tile) {
+  const cv::Mat response = blob_response(level);
+  cv::Mat highest;
+  cv::Mat is_maximum;
+  cv::dilate(response, highest, {});
+  cv::compare(response, highest, is_maximum, cv::CMP_EQ);
+  // A dot's response is 0.35 to 0.55 of its contrast over the sizes that this level answers for.
+  cv::bitwise_and(is_maximum, response >= std::max(1.0, 0.3 * min_contrast), is_maximum);
+  std::vector<cv::Point> result;
+  for (int y = 0; y < level.rows; y += tile_px) {
+    for (int x = 0; x < level.cols; x += tile_px) {
+      const cv::Rect tile(x, y, std::min(tile_px, level.cols - x), std::min(tile_px, level.rows - y));
+      std::vector<cv::Point> maxima;
+      cv::findNonZero(is_maximum(tile), maxima);
+      keep_strongest(maxima, static_cast<std::size_t>(per_tile), response(tile));
+      for (const cv::Point& p : maxima) result.push_back(p + tile.tl());
+    }
+  }
+  return result;
+}
+
+}  // namespace imprint

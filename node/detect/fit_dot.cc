@@ -1,0 +1,203 @@
+#include "node/detect/fit_dot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+namespace imprint {
+namespace {
+
+constexpr int parameters = 10;  // centre 2, shape 3, log blur, black, contrast, shading 2
+using Vector = Eigen::Matrix<double, parameters, 1>;
+using Matrix = Eigen::Matrix<double, parameters, parameters>;
+
+constexpr double min_blur_px = 0.25;     // below the 0.29 px of a pixel's own width
+constexpr double window_radii = 1.5;     // half-way between the dot and a ring that begins at 2
+constexpr double residual_scale = 0.12;  // share of the contrast beyond which a grey value is not the dot's
+
+struct Sample {
+  Eigen::Vector2d p;  // from the guessed centre
+  double grey;
+  double weight;
+};
+
+struct Dot {
+  Eigen::Vector2d center;  // from the guessed centre
+  Eigen::Matrix2d shape;
+  double blur;
+  double black;
+  double contrast;
+  Eigen::Vector2d shading;  // per px
+
+  [[nodiscard]] Dot stepped(const Vector& s) const {
+    Dot next = *this;
+    next.center += s.segment<2>(0);
+    // Multiplicative in the ellipse's own frame: the shape stays positive definite.
+    Eigen::Matrix2d change;
+    change << s[2], s[3], s[3], s[4];
+    const Eigen::Matrix2d root = frame_of({Eigen::Vector2d::Zero(), shape.inverse()});
+    next.shape = root * (Eigen::Matrix2d::Identity() + change + 0.5 * change * change) * root;
+    next.blur = std::max(min_blur_px, blur * std::exp(std::clamp(s[5], -0.7, 0.7)));
+    next.black += s[6];
+    next.contrast += s[7];
+    next.shading += s.segment<2>(8);
+    return next;
+  }
+};
+
+/// Grey value of the model at a place and its derivatives by the parameters of `Dot::stepped`.
+class DotModel {
+ public:
+  explicit DotModel(const Dot& dot) : dot_(dot), root_(frame_of({Eigen::Vector2d::Zero(), dot.shape.inverse()})) {}
+
+  double at(const Eigen::Vector2d& p, Vector* gradient) const {
+    const Eigen::Vector2d q = p - dot_.center;
+    const Eigen::Vector2d in_frame = root_ * q;
+    const double radius = std::max(in_frame.norm(), 1e-6);
+    const Eigen::Vector2d radius_gradient = dot_.shape * q / radius;
+    const double slope = std::max(radius_gradient.norm(), 1e-9);
+    const double z = -(radius - 1.0) / (slope * dot_.blur);  // first order in the distance to the ellipse
+    const double cover = 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0);
+    const double shade = 1.0 + dot_.shading.dot(q);
+    if (gradient != nullptr) {
+      const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+      const double by_z = dot_.contrast * shade * density;
+      const double by_radius = -by_z / (slope * dot_.blur);
+      Vector& g = *gradient;
+      g.segment<2>(0) = -by_radius * radius_gradient - dot_.contrast * cover * dot_.shading;
+      g[2] = by_radius * 0.5 * in_frame.x() * in_frame.x() / radius;
+      g[3] = by_radius * in_frame.x() * in_frame.y() / radius;
+      g[4] = by_radius * 0.5 * in_frame.y() * in_frame.y() / radius;
+      g[5] = -by_z * z;
+      g[6] = 1.0;
+      g[7] = shade * cover;
+      g.segment<2>(8) = dot_.contrast * cover * q;
+    }
+    return dot_.black + dot_.contrast * shade * cover;
+  }
+
+ private:
+  const Dot& dot_;
+  Eigen::Matrix2d root_;
+};
+
+/// Grey values in the window; in large dots only every second or third row and column of what is far from the edge,
+/// with the weight of those left out.
+std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
+  const Eigen::Matrix2d covariance = guess.shape.inverse();
+  const double half_width = window_radii * std::sqrt(covariance(0, 0));
+  const double half_height = window_radii * std::sqrt(covariance(1, 1));
+  const int left = std::max(0, static_cast<int>(std::ceil(guess.center.x() - half_width)));
+  const int right = std::min(image.width() - 1, static_cast<int>(std::floor(guess.center.x() + half_width)));
+  const int top = std::max(0, static_cast<int>(std::ceil(guess.center.y() - half_height)));
+  const int bottom = std::min(image.height() - 1, static_cast<int>(std::floor(guess.center.y() + half_height)));
+  const double semi_minor = axes_of(guess).semi_minor_px;
+  const int stride = semi_minor > 40.0 ? 4 : semi_minor > 16.0 ? 2 : 1;
+  const double edge_band = std::max(0.2, 5.0 / semi_minor);
+  std::vector<Sample> samples;
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
+      const Eigen::Vector2d p(x, y);
+      const double radius = guess.radius_of(p);
+      if (radius > window_radii) continue;
+      const bool near_edge = std::abs(radius - 1.0) < edge_band;
+      if (!near_edge && (x % stride != 0 || y % stride != 0)) continue;
+      samples.push_back({p - guess.center, image.pixel(x, y), near_edge ? 1.0 : static_cast<double>(stride * stride)});
+    }
+  }
+  return samples;
+}
+
+struct NormalEquations {
+  Matrix matrix = Matrix::Zero();
+  Vector right = Vector::Zero();
+  double cost = 0.0;
+  double weight = 0.0;
+};
+
+/// Weights fall as 1 / (1 + (r/scale)^2)^2 of the residual (Geman-McClure); the cost is its own.
+NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& dot, double scale) {
+  NormalEquations equations;
+  const DotModel model(dot);
+  Vector gradient;
+  for (const Sample& sample : samples) {
+    const double residual = sample.grey - model.at(sample.p, &gradient);
+    const double ratio = residual * residual / (scale * scale);
+    const double weight = sample.weight / ((1.0 + ratio) * (1.0 + ratio));
+    equations.matrix.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
+    equations.right += weight * residual * gradient;
+    equations.cost += sample.weight * residual * residual / (1.0 + ratio);
+    equations.weight += weight;
+  }
+  equations.matrix.triangularView<Eigen::StrictlyUpper>() = equations.matrix.transpose();
+  return equations;
+}
+
+/// Levenberg-Marquardt from `dot`; false when it does not come to rest.
+bool adjust(const std::vector<Sample>& samples, double scale, Dot& dot, NormalEquations& equations) {
+  constexpr int max_steps = 20;
+  double damping = 1e-3;
+  equations = normal_equations(samples, dot, scale);
+  for (int i = 0; i < max_steps; ++i) {
+    Matrix damped = equations.matrix;
+    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal().array() += 1e-12;
+    const Vector step = damped.ldlt().solve(equations.right);
+    if (!step.allFinite()) return false;
+    const bool too_far = step.segment<3>(2).cwiseAbs().maxCoeff() > 0.7;
+    const Dot next = dot.stepped(too_far ? Vector(step * 0.5) : step);
+    if (!(next.shape.determinant() > 0.0)) return false;
+    const NormalEquations there = normal_equations(samples, next, scale);
+    const bool better = there.cost <= equations.cost;
+    if (better) {
+      dot = next;
+      equations = there;
+      damping *= 0.2;
+    } else {
+      damping *= 8.0;
+    }
+    const double moved_px = step.head<2>().norm();
+    if (moved_px < 1e-5 || (!better && damping > 1e6)) return true;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<FittedDot> fit_dot(const GreyImage& image, const Ellipse& guess, double white, double black) {
+  const std::vector<Sample> samples = samples_of(image, guess);
+  if (samples.size() < 2 * parameters) return std::nullopt;
+  Dot dot{Eigen::Vector2d::Zero(), guess.shape, 0.8, black, white - black, Eigen::Vector2d::Zero()};
+  NormalEquations equations;
+  // Twice: with a wide scale, then with the noise known.
+  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, dot, equations) || !(dot.contrast > 0.0))
+    return std::nullopt;
+  double noise = std::sqrt(equations.cost / std::max(1.0, equations.weight));
+  const double scale = std::max(residual_scale * dot.contrast, 5.0 * noise);
+  if (!adjust(samples, scale, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
+
+  FittedDot fitted;
+  fitted.ellipse = {guess.center + dot.center, dot.shape};
+  const EllipseAxes axes = axes_of(fitted.ellipse);
+  if (guess.radius_of(fitted.ellipse.center) > 0.5 || axes.semi_minor_px < 0.5 * axes_of(guess).semi_minor_px ||
+      axes.semi_major_px > 2.0 * axes_of(guess).semi_major_px) {
+    return std::nullopt;
+  }
+  const double effective = equations.weight - parameters;
+  if (effective < parameters) return std::nullopt;
+  noise = std::sqrt(equations.cost / effective);
+  const Matrix covariance = equations.matrix.ldlt().solve(Matrix::Identity()) * (noise * noise);
+  fitted.blur_px = dot.blur;
+  fitted.black = dot.black;
+  fitted.contrast = dot.contrast;
+  fitted.noise = noise;
+  fitted.sigma_px = std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
+  if (!std::isfinite(fitted.sigma_px)) return std::nullopt;
+  return fitted;
+}
+
+}  // namespace imprint

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+
+#include "node/detect/ellipse.h"
+#include "node/detect/image_pyramid.h"
+
+namespace imprint {
+
+/// A dot as fitted to the grey values themselves.
+struct FittedDot {
+  Ellipse ellipse;
+  double blur_px = 0.0;   ///< standard deviation of the edge's blur, the pixel's own width (1/12 px^2) included
+  double black = 0.0;     ///< grey level of the ground
+  double contrast = 0.0;  ///< white minus black at the centre
+  double noise = 0.0;     ///< standard deviation of a grey value about the model
+  double sigma_px = 0.0;  ///< standard deviation of each coordinate of the centre
+};
+
+/// The dot near `guess` (in px of `image`) by least squares of all grey values within 1.5 radii against a blurred
+/// ellipse: black + contrast (1 + g.(x - c)) Phi(-d / blur), d the distance to the ellipse, g a shading. Ellipse, blur,
+/// grey levels and shading are fitted together, pixels that do not fit (dirt, a cover) weigh less. The centre of a
+/// symmetric dot has no bias whatever the blur's shape is, and its standard deviation comes from the normal equations.
+/// Nothing when it does not converge near the guess. In place of the edge points of [A] 2.3.4.
+std::optional<FittedDot> fit_dot(const GreyImage& image, const Ellipse& guess, double white, double black);
+
+}  // namespace imprint

@@ -1,0 +1,170 @@
+#include "node/detect/scan_ring.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/LU>
+
+namespace imprint {
+namespace {
+
+constexpr int columns_per_bit = 24;
+constexpr int rows = 5;
+constexpr int neglected = 4;  // columns at each end of a bit, "Neg" of [A] 2.3.5
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+double normal_cdf(double z) { return 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0); }
+
+/// Middle of a scan row, in dot radii: the rows cover the middle 60 % of the ring.
+double row_radius(const TargetGeometry& geometry, int row) {
+  const double share = 0.2 + 0.6 * (row + 0.5) / rows;
+  return (geometry.ring_inner_radius + share * (geometry.ring_outer_radius - geometry.ring_inner_radius)) /
+         geometry.dot_radius;
+}
+
+/// The level on which the dot's smaller radius is 5 to 10 px.
+int scan_level(const ImagePyramid& pyramid, double semi_minor_px) {
+  int l = 0;
+  while (l + 1 < pyramid.levels() && semi_minor_px / ImagePyramid::scale(l) > 10.0) ++l;
+  return l;
+}
+
+/// Mean reading of each column; NaN where the ring leaves the image.
+std::vector<double> scan_columns(const ImagePyramid& pyramid, const FittedDot& dot, int columns,
+                                 const TargetGeometry& geometry) {
+  const int l = scan_level(pyramid, axes_of(dot.ellipse).semi_minor_px);
+  const GreyImage& level = pyramid.level(l);
+  const Eigen::Vector2d center = ImagePyramid::to_level(dot.ellipse.center, l);
+  const Eigen::Matrix2d frame = frame_of(dot.ellipse) / ImagePyramid::scale(l);
+  std::vector<double> readings(static_cast<std::size_t>(columns));
+  for (int i = 0; i < columns; ++i) {
+    const double angle = two_pi * (i + 0.5) / columns;
+    const Eigen::Vector2d direction = frame * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    double sum = 0.0;
+    for (int row = 0; row < rows; ++row) {
+      const Eigen::Vector2d p = center + row_radius(geometry, row) * direction;
+      sum += level.contains(p) ? level.bilinear(p) : std::numeric_limits<double>::quiet_NaN();
+    }
+    readings[static_cast<std::size_t>(i)] = (sum / rows - dot.black) / dot.contrast;
+  }
+  return readings;
+}
+
+struct BitReading {
+  double mean = 0.0;
+  double deviation = 0.0;
+};
+
+BitReading read_bit(const std::vector<double>& columns, std::size_t first) {
+  BitReading reading;
+  constexpr int used = columns_per_bit - 2 * neglected;
+  const auto column = [&](int i) {
+    return columns[(first + neglected + static_cast<std::size_t>(i)) % columns.size()];
+  };
+  for (int i = 0; i < used; ++i) reading.mean += column(i) / used;
+  for (int i = 0; i < used; ++i) reading.deviation += std::abs(column(i) - reading.mean) / used;
+  return reading;
+}
+
+/// Column at which a bit begins. A bit's deviation counts up to a limit, so that dirt does not turn the ring.
+std::size_t first_column(const std::vector<double>& columns, int bits, double* deviation) {
+  std::size_t best = 0;
+  *deviation = std::numeric_limits<double>::max();
+  for (std::size_t phase = 0; phase < columns_per_bit; ++phase) {
+    double sum = 0.0;
+    for (int bit = 0; bit < bits; ++bit) {
+      const double d = read_bit(columns, phase + static_cast<std::size_t>(bit) * columns_per_bit).deviation;
+      sum += std::isnan(d) ? 0.0 : std::min(d, 0.5);
+    }
+    if (sum / bits < *deviation) {
+      *deviation = sum / bits;
+      best = phase;
+    }
+  }
+  return best;
+}
+
+/// The response of the bit centred at `angle`: blur is a Gaussian in px, its width in radii and in angle follows from
+/// the frame of the ellipse there.
+BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& geometry, double angle) {
+  const Eigen::Matrix2d to_frame = frame_of(dot.ellipse).inverse();
+  const Eigen::Vector2d outward(std::cos(angle), std::sin(angle));
+  const Eigen::Vector2d along(-outward.y(), outward.x());
+  const double radial_sigma = dot.blur_px * (to_frame.transpose() * outward).norm();
+  const double along_sigma = dot.blur_px * (to_frame.transpose() * along).norm();
+  const double inner = geometry.ring_inner_radius / geometry.dot_radius;
+  const double outer = geometry.ring_outer_radius / geometry.dot_radius;
+  const double bit_angle = two_pi / bits;
+  constexpr double half_used = 0.5 - static_cast<double>(neglected) / columns_per_bit;
+  double radial = 0.0;
+  BitResponse response;
+  for (int row = 0; row < rows; ++row) {
+    const double r = row_radius(geometry, row);
+    radial += (normal_cdf((outer - r) / radial_sigma) - normal_cdf((inner - r) / radial_sigma)) / rows;
+    response.floor += normal_cdf((1.0 - r) / radial_sigma) / rows;
+  }
+  response.own = 0.0;
+  const double angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;  // in bits
+  constexpr int steps = 5;
+  for (int i = 0; i < steps; ++i) {
+    const double at = half_used * (2.0 * (i + 0.5) / steps - 1.0);
+    const double left = normal_cdf((-0.5 - at) / angular_sigma);
+    const double right = normal_cdf((at - 0.5) / angular_sigma);
+    response.own += (1.0 - left - right) / steps;
+    response.beside += 0.5 * (left + right) / steps;
+  }
+  response.own *= radial;
+  response.beside *= radial;
+  return response;
+}
+
+}  // namespace
+
+std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
+                                  const TargetGeometry& geometry, double max_unknown) {
+  const int count = bits * columns_per_bit;
+  const std::vector<double> columns = scan_columns(pyramid, dot, count, geometry);
+  const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
+  if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
+  RingScan scan;
+  const std::size_t first = first_column(columns, bits, &scan.deviation);
+  for (int bit = 0; bit < bits; ++bit) {
+    const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
+    scan.reading.push_back(read_bit(columns, begin).mean);
+    scan.response.push_back(
+        response_at(dot, bits, geometry, two_pi * (static_cast<double>(begin) + 0.5 * columns_per_bit) / count));
+  }
+  // Pixels that one reading averages: the scanned part of a bit's area, at least one.
+  const EllipseAxes axes = axes_of(dot.ellipse);
+  const double inner = row_radius(geometry, 0);
+  const double outer = row_radius(geometry, rows - 1);
+  const double area =
+      std::numbers::pi * axes.semi_major_px * axes.semi_minor_px * (outer * outer - inner * inner) / bits * 0.67;
+  scan.noise = dot.noise / dot.contrast / std::sqrt(std::max(1.0, area));
+  return scan;
+}
+
+RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black,
+                          const TargetGeometry& geometry) {
+  constexpr int places = 36;
+  const Eigen::Matrix2d frame = frame_of(dot);
+  const double inner = geometry.ring_inner_radius / geometry.dot_radius;
+  const double outer = geometry.ring_outer_radius / geometry.dot_radius;
+  const double half = 0.5 * (white + black);
+  int dark = 0;
+  int bright = 0;
+  for (int i = 0; i < places; ++i) {
+    const double angle = two_pi * i / places;
+    const Eigen::Vector2d direction = frame * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const Eigen::Vector2d in_valley = dot.center + 0.5 * (1.0 + inner) * direction;
+    const Eigen::Vector2d on_ring = dot.center + 0.5 * (inner + outer) * direction;
+    if (level.contains(in_valley) && level.bilinear(in_valley) < half) ++dark;
+    if (level.contains(on_ring) && level.bilinear(on_ring) > black + 0.35 * (white - black)) ++bright;
+  }
+  return {static_cast<double>(dark) / places, static_cast<double>(bright) / places};
+}
+
+}  // namespace imprint

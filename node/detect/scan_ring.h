@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lib/targets/target_library.h"
+#include "node/detect/fit_dot.h"
+#include "node/detect/image_pyramid.h"
+
+namespace imprint {
+
+/// How a blurred image of a ring shows at one bit: reading = floor + own bit * own + (its neighbours') * beside.
+/// Without blur floor = 0, own = 1, beside = 0.
+struct BitResponse {
+  double floor = 0.0;  ///< light of the dot that reaches the ring
+  double own = 1.0;
+  double beside = 0.0;  ///< light of each of the two next bits
+};
+
+/// What is read off a code ring, one value a bit, clockwise as seen from an arbitrary bit.
+struct RingScan {
+  std::vector<double> reading;  ///< 0: as black as the ground of the dot; 1: as white as the dot; NaN: outside
+  std::vector<BitResponse> response;
+  double noise = 0.0;      ///< standard deviation of a reading from the noise of the image
+  double deviation = 0.0;  ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
+};
+
+/// Scans the ring of a dot densely (24 columns a bit, 5 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
+/// turns the columns so that the sum of the mean deviations within the bits is least. `dot` is in px of level 0; the
+/// scan takes the pyramid level whose pixels fit the dot's size, so that in large rings noise is averaged out.
+/// Nothing when more than `max_unknown` of the ring lies outside the image.
+std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
+                                  const TargetGeometry& geometry, double max_unknown);
+
+/// Quick look at a dot found on one level: the share of places round it that are dark in the valley between dot and
+/// ring, and the share that are white on the ring.
+struct RingGlance {
+  double dark_valley = 0.0;
+  double white_ring = 0.0;
+};
+RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black,
+                          const TargetGeometry& geometry);
+
+}  // namespace imprint
