@@ -12,9 +12,9 @@ namespace imprint {
 struct EdgePoint {
   int station_px = 0;
   double offset_px = 0.0;
-  double magnitude = 0.0;      ///< gradient magnitude, share of full scale per px
-  double direction_deg = 90.0; ///< gradient direction against the forging axis; 90 = perpendicular
-  double sigma_px = 0.0;       ///< expected standard deviation of the offset
+  double magnitude = 0.0;       ///< gradient magnitude, share of full scale per px
+  double direction_deg = 90.0;  ///< gradient direction against the forging axis; 90 = perpendicular
+  double sigma_px = 0.0;        ///< expected standard deviation of the offset
 };
 
 struct LocatedEnd {
@@ -26,12 +26,12 @@ struct LocatedEnd {
 
 /// The silhouette of the forging in the observed image, before filtering; frame of the segmentation.
 struct Silhouette {
-  Segmentation frame;             ///< origin and direction of stations and offsets
-  std::vector<EdgePoint> upper;   ///< ascending station, at most one a station
+  Segmentation frame;            ///< origin and direction of stations and offsets
+  std::vector<EdgePoint> upper;  ///< ascending station, at most one a station
   std::vector<EdgePoint> lower;
-  LocatedEnd start;               ///< end with the smaller station
+  LocatedEnd start;  ///< end with the smaller station
   LocatedEnd end;
-  double contrast = 0.0;          ///< median step across the rims, share of full scale
+  double contrast = 0.0;  ///< median step across the rims, share of full scale
   double saturated_fraction = 0.0;
 };
 

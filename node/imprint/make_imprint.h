@@ -28,7 +28,8 @@ struct FilteredSilhouette {
 /// Validation by connected regions, weights by [C] equation 1, weighted parabola fit (windows 10 and 40);
 /// the axis is the middle of the rims with the lower of their weights. `best` adds what is ours.
 /// Fails (job_failed) when too little of the rims is left to describe a forging.
-Result<FilteredSilhouette> filter_silhouette(const Silhouette& silhouette, EdgeMethod method, const FilterConfig& config);
+Result<FilteredSilhouette> filter_silhouette(const Silhouette& silhouette, EdgeMethod method,
+                                             const FilterConfig& config);
 
 /// Fills grid, curves and ends of an imprint: distortion removed, 500 stations a curve.
 /// Nothing else of the imprint is touched.

@@ -11,9 +11,9 @@ namespace imprint {
 
 /// What the rig and the pose say about where the forging can be in the observed image.
 struct SegmentPrior {
-  double direction_x = 1.0;        ///< rough axis direction in the observed image, unit vector
+  double direction_x = 1.0;  ///< rough axis direction in the observed image, unit vector
   double direction_y = 0.0;
-  double diameter_min_px = 0.0;    ///< range of the silhouette's width across the axis
+  double diameter_min_px = 0.0;  ///< range of the silhouette's width across the axis
   double diameter_max_px = 0.0;
   Polarity polarity = Polarity::bright;
 };
@@ -30,7 +30,7 @@ struct Segmentation {
   int first_station_px = 0;            ///< station of the first element of the vectors below
   std::vector<float> upper_offset_px;  ///< expected rim with the smaller offset; NaN where none was seen
   std::vector<float> lower_offset_px;
-  double score = 0.0;                  ///< how sure: share of the length with both rims, 0 to 1
+  double score = 0.0;  ///< how sure: share of the length with both rims, 0 to 1
 };
 
 /// Finds the one forging that fits the prior, [C] 2.3.2 "Forging segmentation".

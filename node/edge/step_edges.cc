@@ -1,0 +1,115 @@
+#include "node/edge/step_edges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "node/edge/subpixel.h"
+
+namespace imprint {
+namespace {
+
+// The samples a step is fitted to: about the edge, out to where the blur has died away, and nothing of its neighbours.
+struct Window {
+  int from = 0, count = 0;
+};
+Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur) {
+  const int reach = std::clamp(static_cast<int>(std::ceil(2.5 * blur + 1.5)), 3, 12);
+  const int middle = static_cast<int>(std::lround(traced.edge.position_px - line.first_px));
+  const int from = std::max({0, middle - reach, std::min(traced.edge.from_sample, middle - 2)});
+  const int to = std::min({line.count - 1, middle + reach, std::max(traced.edge.to_sample, middle + 2)});
+  return {from, to - from + 1};
+}
+
+std::optional<StepFit> fit_at(const ScanLines& scan, const TracedEdge& traced, double blur, bool free_blur,
+                              Window& window) {
+  const ScanLine& line = scan.lines[traced.line];
+  window = fit_window(line, traced, blur);
+  return fit_step(scan.samples(line) + window.from, window.count, traced.edge.position_px - line.first_px - window.from,
+                  blur, free_blur);
+}
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// The blur at every traced edge: medians of free fits over regions.
+std::vector<double> regional_blur(const ScanLines& scan, const std::vector<TracedEdge>& traced,
+                                  std::size_t region_lines) {
+  constexpr double kStartBlur = 1.0;
+  constexpr std::size_t kEvery = 8;
+  std::vector<double> blur(traced.size(), kStartBlur), all;
+  std::vector<std::vector<double>> regions(traced.size() / region_lines + 1);
+  for (std::size_t i = 0; i < traced.size(); i += kEvery) {
+    Window window;
+    auto fit = fit_at(scan, traced[i], 2.0, true, window);
+    if (!fit) fit = fit_at(scan, traced[i], kStartBlur, true, window);
+    if (!fit || fit->blur > 6) continue;
+    regions[i / region_lines].push_back(fit->blur);
+    all.push_back(fit->blur);
+  }
+  if (all.empty()) return blur;
+  const double overall = median(all);
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    const double value = regions[r].size() >= 8 ? median(regions[r]) : overall;
+    for (std::size_t i = r * region_lines; i < std::min(traced.size(), (r + 1) * region_lines); ++i) blur[i] = value;
+  }
+  return blur;
+}
+
+}  // namespace
+
+std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
+  const std::vector<double> blur = regional_blur(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
+  std::vector<StepEdge> edges;
+  std::vector<double> residuals, own, unit;
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    Window window;
+    const auto fit = fit_at(scan, traced[i], blur[i], false, window);
+    if (!fit) continue;
+    edges.push_back(
+        {traced[i].line, scan.lines[traced[i].line].first_px + window.from + fit->position, 0.0, fit->step});
+    own.push_back(fit->residual);
+    unit.push_back(fit->sigma_unit);
+  }
+  if (edges.empty()) return edges;
+  // A handful of samples tells little about the noise: the rim's common noise is the floor.
+  residuals = own;
+  const double common = median(residuals);
+  for (std::size_t i = 0; i < edges.size(); ++i) edges[i].sigma_px = unit[i] * std::max(common, own[i]);
+  return edges;
+}
+
+std::vector<StepEdge> zero_crossing_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced) {
+  const int lag = std::max(1, static_cast<int>(std::lround(0.5 / scan.spacing_px)));
+  std::vector<StepEdge> edges;
+  for (const TracedEdge& t : traced) {
+    const ScanLine& line = scan.lines[t.line];
+    const float* values = scan.samples(line);
+    const double start = (t.edge.position_px - line.first_px) / scan.spacing_px;
+    const auto crossing = zero_crossing(values, line.count, start, lag);
+    if (!crossing) continue;
+    const int reach = static_cast<int>(std::lround(3 / scan.spacing_px)), middle = static_cast<int>(std::lround(start));
+    const double step = values[std::min(line.count - 1, middle + reach)] - values[std::max(0, middle - reach)];
+    edges.push_back({t.line, line.first_px + *crossing * scan.spacing_px, 0.0, step});
+  }
+  return edges;
+}
+
+std::vector<StepEdge> highest_gradient_edges(const ScanLines& scan) {
+  const int lag = std::max(1, static_cast<int>(std::lround(1 / scan.spacing_px)));
+  std::vector<StepEdge> edges;
+  for (std::size_t n = 0; n < scan.lines.size(); ++n) {
+    const ScanLine& line = scan.lines[n];
+    const float* values = scan.samples(line);
+    int best = -1;
+    float highest = 0;
+    for (int i = lag; i + lag < line.count; ++i)
+      if (const float slope = values[i + lag] - values[i - lag]; slope > highest) highest = slope, best = i;
+    if (best >= 0) edges.push_back({n, line.first_px + best * scan.spacing_px, 0.0, highest});
+  }
+  return edges;
+}
+
+}  // namespace imprint

@@ -1,0 +1,168 @@
+#include "node/imprint/robust_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "node/imprint/rim_steps.h"
+
+namespace imprint {
+namespace {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// What the point's own looks say: a weak edge, one that runs askew to its neighbours or a bad fit counts less.
+RimCurve rated_curve(const std::vector<EdgePoint>& points) {
+  RimCurve curve;
+  curve.reserve(points.size());
+  std::vector<double> magnitudes, directions, sigmas;
+  for (const EdgePoint& p : points) {
+    magnitudes.push_back(p.magnitude), directions.push_back(p.direction_deg), sigmas.push_back(p.sigma_px);
+  }
+  const double magnitude = median(magnitudes), direction = median(directions), sigma = std::max(1e-4, median(sigmas));
+  for (const EdgePoint& p : points) {
+    const double by_magnitude = std::min(1.0, p.magnitude / (0.7 * magnitude + 1e-9));
+    const double askew = (p.direction_deg - direction) / 30.0;
+    const double excess = std::max(1.0, p.sigma_px / (1.5 * sigma));
+    curve.push_back({static_cast<double>(p.station_px), p.offset_px,
+                     by_magnitude * std::exp(-0.5 * askew * askew) / (excess * excess)});
+  }
+  return curve;
+}
+
+// Robust (bisquare) local fit at every whole station; never across the cuts. Weight: the mean trust in its samples,
+// less where they lie to one side or are few.
+RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts, int window, double noise_px) {
+  RimCurve out;
+  if (curve.empty()) return out;
+  const double half = 0.5 * window;
+  const double scale = 4.685 * std::max(noise_px, 0.02);
+  double kernel = 0;  // the sum of the weights of a full window
+  for (int k = -static_cast<int>(half); k <= static_cast<int>(half); ++k)
+    kernel += std::pow(1 - std::pow(std::abs(k) / (half + 1), 3), 3);
+  RimCurve near;
+  std::vector<double> prior;
+  for (double station = curve.front().station_px; station <= curve.back().station_px + 0.5; station += 1.0) {
+    const auto next = std::lower_bound(cuts.begin(), cuts.end(), station);
+    const double low = std::max(station - half, next == cuts.begin() ? -1e18 : *(next - 1));
+    const double high = std::min(station + half, next == cuts.end() ? 1e18 : *next);
+    const SampleRange range = samples_near(curve, 0.5 * (low + high), 0.5 * (high - low));
+    near.assign(curve.begin() + static_cast<std::ptrdiff_t>(range.first),
+                curve.begin() + static_cast<std::ptrdiff_t>(range.last));
+    double trust = 0;
+    for (CurveSample& s : near) {
+      const double z = (s.station_px - station) / (half + 1);
+      s.weight *= std::pow(1 - std::abs(z * z * z), 3);
+    }
+    auto fit = fit_parabola(near.data(), near.data() + near.size(), station, 2);
+    if (near.size() > 4) {
+      prior.clear();
+      for (const CurveSample& s : near) prior.push_back(s.weight);
+      for (int pass = 0; pass < 2 && fit; ++pass) {
+        const LocalParabola current = *fit;
+        for (std::size_t i = 0; i < near.size(); ++i) {
+          const double r = (near[i].offset_px - current.at(near[i].station_px)) / scale;
+          near[i].weight = prior[i] * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
+        }
+        fit = fit_parabola(near.data(), near.data() + near.size(), station, 2);
+      }
+    }
+    for (const CurveSample& s : near) trust += s.weight;
+    // A cut takes away one half of the window at most: that is no reason for distrust.
+    const double share = fit ? std::clamp(2 * trust / kernel, 0.0, 1.0) : 0.0;
+    out.push_back({station, fit ? fit->c0 : 0.0, share < 0.1 ? 0.0 : share});
+  }
+  return out;
+}
+
+// Finite offsets where nothing is trusted: on the line between the trusted neighbours.
+void bridge_untrusted(RimCurve& curve) {
+  std::size_t before = curve.size();
+  for (std::size_t i = 0; i <= curve.size(); ++i) {
+    if (i < curve.size() && !(curve[i].weight > 0)) continue;
+    const std::size_t from = before == curve.size() ? 0 : before + 1;
+    for (std::size_t k = from; k < i && i - from < curve.size(); ++k) {
+      if (before == curve.size()) {
+        curve[k].offset_px = i < curve.size() ? curve[i].offset_px : 0.0;
+      } else if (i == curve.size()) {
+        curve[k].offset_px = curve[before].offset_px;
+      } else {
+        const double t =
+            (curve[k].station_px - curve[before].station_px) / (curve[i].station_px - curve[before].station_px);
+        curve[k].offset_px = (1 - t) * curve[before].offset_px + t * curve[i].offset_px;
+      }
+    }
+    before = i;
+  }
+}
+
+// Where the middle of the rims leaves its smooth course, one of them is wrong: scale moves an edge inwards, so the
+// one that lies further in is not believed.
+void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& config) {
+  const RimCurve middle = middle_of(upper, lower);
+  if (middle.size() < 20) return;
+  const double noise = std::max(0.05, rim_noise_px(middle));
+  RimCurve course = middle;
+  std::vector<double> residual(middle.size(), 0.0);
+  for (int pass = 0; pass < 3; ++pass) {
+    // A coarse grid will do: the course is smooth by intent.
+    constexpr double kEvery = 10;
+    const double first = middle.front().station_px, last = middle.back().station_px;
+    std::vector<double> grid;
+    for (double s = first; s <= last + kEvery; s += kEvery)
+      grid.push_back(fit_at_station(course, samples_near(course, std::min(s, last), 0.5 * config.agreement_window),
+                                    std::min(s, last), 2)
+                         .value_or(std::nan("")));
+    for (std::size_t i = 0; i < middle.size(); ++i) {
+      const double at = (middle[i].station_px - first) / kEvery;
+      const auto g = std::min(static_cast<std::size_t>(at), grid.size() - 2);
+      const double t = at - static_cast<double>(g);
+      const double smooth = (1 - t) * grid[g] + t * grid[g + 1];
+      residual[i] = std::isnan(smooth) ? 0.0 : middle[i].offset_px - smooth;
+    }
+    const double scale = 4.685 * std::max(noise, 0.5 * config.min_disagreement_px);
+    for (std::size_t i = 0; i < middle.size(); ++i) {
+      const double r = residual[i] / scale;
+      course[i].weight = middle[i].weight * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
+    }
+  }
+  const double limit = std::max(config.min_disagreement_px, 5 * noise);
+  const auto distrust = [](RimCurve& rim, double station, double factor) {
+    const SampleRange range = samples_near(rim, station, 0.25);
+    for (std::size_t k = range.first; k < range.last; ++k) rim[k].weight *= factor;
+  };
+  for (std::size_t i = 0; i < middle.size(); ++i) {
+    const double excess = std::abs(residual[i]) / limit;
+    if (excess > 0.5)
+      distrust(residual[i] > 0 ? upper : lower, middle[i].station_px, excess > 1 ? 0.0 : 2 * (1 - excess));
+  }
+}
+
+}  // namespace
+
+FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& config) {
+  RimCurve upper = rated_curve(validate_regions(silhouette.upper, config));
+  RimCurve lower = rated_curve(validate_regions(silhouette.lower, config));
+  drop_spikes(upper), drop_spikes(lower);
+  const double noise_upper = rim_noise_px(upper), noise_lower = rim_noise_px(lower);
+  const std::vector<double> upper_cuts = find_cuts(upper, noise_upper, config),
+                            lower_cuts = find_cuts(lower, noise_lower, config);
+  reject_patches(upper, upper_cuts, lower, config);
+  reject_patches(lower, lower_cuts, upper, config);
+  reject_disagreement(upper, lower, config);
+
+  FilteredCurves out;
+  const RimCurve axis = middle_of(upper, lower);
+  out.upper = local_regression(upper, upper_cuts, config.best_rim_window, noise_upper);
+  out.lower = local_regression(lower, lower_cuts, config.best_rim_window, noise_lower);
+  out.axis = local_regression(axis, {}, config.best_axis_window, rim_noise_px(axis));
+  bridge_untrusted(out.upper), bridge_untrusted(out.lower), bridge_untrusted(out.axis);
+  return out;
+}
+
+}  // namespace imprint

@@ -1,0 +1,122 @@
+#include "node/segment/axis_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace imprint {
+namespace {
+
+// Means of the column's pixels between two rows, from running sums.
+class ColumnSums {
+ public:
+  ColumnSums(const cv::Mat_<float>& image, int x) : sum_(static_cast<std::size_t>(image.rows) + 1, 0.0) {
+    for (int y = 0; y < image.rows; ++y)
+      sum_[static_cast<std::size_t>(y) + 1] = sum_[static_cast<std::size_t>(y)] + image(y, x);
+  }
+  [[nodiscard]] double mean(double from, double to) const {
+    const int last = static_cast<int>(sum_.size()) - 2;
+    const int a = std::clamp(static_cast<int>(std::lround(from)), 0, last);
+    const int b = std::clamp(static_cast<int>(std::lround(to)), a, last);
+    return (sum_[static_cast<std::size_t>(b) + 1] - sum_[static_cast<std::size_t>(a)]) / (b - a + 1);
+  }
+
+ private:
+  std::vector<double> sum_;
+};
+
+// How much of the inside is brighter than the level halfway between outside and rim, 0 to 1. Two bodies with
+// a gap between them, or the rim of one and the rim of another, fail here.
+double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums, const RimPair& pair) {
+  const double width = pair.lower_px - pair.upper_px;
+  const double band = std::max(2.0, 0.06 * width);
+  const double above = sums.mean(pair.upper_px - 2 - band, pair.upper_px - 2);
+  const double below = sums.mean(pair.lower_px + 2, pair.lower_px + 2 + band);
+  const double at_upper = sums.mean(pair.upper_px + 2, pair.upper_px + 2 + band);
+  const double at_lower = sums.mean(pair.lower_px - 2 - band, pair.lower_px - 2);
+  const double outside = std::max(above, below);
+  const double step = std::min(at_upper - above, at_lower - below);
+  if (step <= 0) return 0.0;
+  const double level = std::min(outside, 0.5 * (above + below) + step) + 0.3 * step;
+  int bright = 0, count = 0;
+  const int from = static_cast<int>(pair.upper_px) + 2, to = static_cast<int>(pair.lower_px) - 2;
+  for (int y = from; y <= to; y += 2, ++count) bright += image(y, x) > level;
+  const double share = count > 0 ? static_cast<double>(bright) / count : 0.0;
+  return std::clamp((share - 0.4) / 0.4, 0.0, 1.0);
+}
+
+}  // namespace
+
+std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px,
+                                            double max_width_px) {
+  std::vector<std::vector<RimPair>> pairs(rims.upper.size());
+  for (std::size_t x = 0; x < rims.upper.size(); ++x) {
+    if (rims.upper[x].empty() || rims.lower[x].empty()) continue;
+    const ColumnSums sums(working.intensity, static_cast<int>(x));
+    for (const RimCandidate& upper : rims.upper[x]) {
+      for (const RimCandidate& lower : rims.lower[x]) {
+        const float width = lower.y_px - upper.y_px;
+        if (width < min_width_px || width > max_width_px) continue;
+        RimPair pair{upper.y_px, lower.y_px, std::sqrt(upper.strength * lower.strength)};
+        pair.weight *= static_cast<float>(inside_weight(working.intensity, static_cast<int>(x), sums, pair));
+        if (pair.weight > 0.05F) pairs[x].push_back(pair);
+      }
+    }
+  }
+  return pairs;
+}
+
+std::vector<AxisLine> vote_axis_lines(const std::vector<std::vector<RimPair>>& pairs, int height_px,
+                                      double separation_px, const SegmentConfig& config) {
+  constexpr double kBinPx = 2.0, kAngleStepDeg = 0.5;
+  const int half_angles = static_cast<int>(std::ceil(config.max_tilt_deg / kAngleStepDeg));
+  const int angles = 2 * half_angles + 1;
+  const double x0 = 0.5 * static_cast<double>(pairs.size());
+  const double margin = x0 * std::tan(config.max_tilt_deg * std::numbers::pi / 180);
+  const int bins = static_cast<int>((height_px + 2 * margin) / kBinPx) + 2;
+
+  struct Cell {
+    float votes = 0, last = 0;
+    int column = -1;
+  };
+  std::vector<Cell> cells(static_cast<std::size_t>(angles) * static_cast<std::size_t>(bins));
+  std::vector<double> slopes(static_cast<std::size_t>(angles));
+  for (int a = 0; a < angles; ++a)
+    slopes[static_cast<std::size_t>(a)] = std::tan((a - half_angles) * kAngleStepDeg * std::numbers::pi / 180);
+  for (std::size_t x = 0; x < pairs.size(); ++x) {
+    for (const RimPair& pair : pairs[x]) {
+      for (int a = 0; a < angles; ++a) {
+        const double y = pair.middle_px() - slopes[static_cast<std::size_t>(a)] * (static_cast<double>(x) - x0);
+        const int bin = static_cast<int>((y + margin) / kBinPx);
+        if (bin < 0 || bin >= bins) continue;
+        Cell& cell =
+            cells[static_cast<std::size_t>(a) * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)];
+        if (cell.column != static_cast<int>(x)) cell.column = static_cast<int>(x), cell.last = 0;
+        if (pair.weight > cell.last) cell.votes += pair.weight - cell.last, cell.last = pair.weight;
+      }
+    }
+  }
+
+  // A bowed axis spreads over neighbouring bins: sum three.
+  std::vector<float> votes(cells.size(), 0.0F);
+  for (int a = 0; a < angles; ++a)
+    for (int b = 1; b + 1 < bins; ++b) {
+      const std::size_t i = static_cast<std::size_t>(a) * static_cast<std::size_t>(bins) + static_cast<std::size_t>(b);
+      votes[i] = cells[i - 1].votes + cells[i].votes + cells[i + 1].votes;
+    }
+  std::vector<AxisLine> lines;
+  while (static_cast<int>(lines.size()) < config.axis_candidates) {
+    const auto best = std::max_element(votes.begin(), votes.end());
+    if (best == votes.end() || *best <= 0) break;
+    const auto index = static_cast<int>(best - votes.begin());
+    const int a = index / bins, b = index % bins;
+    lines.push_back({x0, (b + 0.5) * kBinPx - margin, slopes[static_cast<std::size_t>(a)], *best});
+    const int apart = std::max(1, static_cast<int>(separation_px / kBinPx));
+    for (int other = 0; other < angles; ++other)
+      for (int c = std::max(0, b - apart); c <= std::min(bins - 1, b + apart); ++c)
+        votes[static_cast<std::size_t>(other) * static_cast<std::size_t>(bins) + static_cast<std::size_t>(c)] = 0.0F;
+  }
+  return lines;
+}
+
+}  // namespace imprint

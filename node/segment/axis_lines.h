@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "node/segment/rim_candidates.h"
+
+namespace imprint {
+
+/// Two rims of one column that could bound the forging.
+struct RimPair {
+  float upper_px = 0;
+  float lower_px = 0;
+  float weight = 0;  ///< 0 to 1: strength of both rims and how well the inside is brighter than the outside
+
+  [[nodiscard]] float middle_px() const { return 0.5F * (upper_px + lower_px); }
+};
+
+/// A straight axis in the working image: y = y0_px + slope (x - x0_px).
+struct AxisLine {
+  double x0_px = 0.0;
+  double y0_px = 0.0;
+  double slope = 0.0;
+  double votes = 0.0;
+
+  [[nodiscard]] double y_px(double x_px) const { return y0_px + slope * (x_px - x0_px); }
+};
+
+/// The pairs of each column whose distance is between the limits (virtual axis points of [C] 2.3.2).
+std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px,
+                                            double max_width_px);
+
+/// The lines with the most votes, by descending votes, apart by at least `separation_px` (Hough, [C] 2.3.2).
+/// A column gives one vote to a line however many pairs it has there.
+std::vector<AxisLine> vote_axis_lines(const std::vector<std::vector<RimPair>>& pairs, int height_px,
+                                      double separation_px, const SegmentConfig& config);
+
+}  // namespace imprint

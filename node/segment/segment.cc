@@ -1,0 +1,168 @@
+#include "node/segment/segment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "node/segment/axis_lines.h"
+#include "node/segment/body_path.h"
+#include "node/segment/rim_candidates.h"
+#include "node/segment/segment_config.h"
+#include "node/segment/working_image.h"
+
+namespace imprint {
+namespace {
+
+// The straight line through the middles, robust against the few columns that took a wrong rim.
+AxisLine fit_axis(const BodyPath& path) {
+  AxisLine line;
+  line.x0_px = 0.5 * (path.columns.front().x_px + path.columns.back().x_px);
+  double scale = 1e9;
+  for (int pass = 0; pass < 3; ++pass) {
+    double sw = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    for (const auto& c : path.columns) {
+      const double x = c.x_px - line.x0_px, y = c.pair.middle_px();
+      const double r = (y - line.y0_px - line.slope * x) / scale;
+      const double w = c.pair.weight / (1 + r * r);
+      sw += w, sx += w * x, sy += w * y, sxx += w * x * x, sxy += w * x * y;
+    }
+    const double det = sw * sxx - sx * sx;
+    line.slope = det > 1e-9 ? (sw * sxy - sx * sy) / det : 0.0;
+    line.y0_px = (sy - line.slope * sx) / sw;
+    scale = 2.0;
+  }
+  return line;
+}
+
+struct RimSample {
+  double station_px, upper_px, lower_px;
+};
+
+// Rims at whole stations between the samples; NaN across gaps longer than `max_gap_px`.
+void resample_rims(const std::vector<RimSample>& samples, double max_gap_px, Segmentation& out) {
+  const int first = static_cast<int>(std::ceil(samples.front().station_px));
+  const int last = static_cast<int>(std::floor(samples.back().station_px));
+  out.first_station_px = first;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  out.upper_offset_px.assign(static_cast<std::size_t>(std::max(0, last - first + 1)), nan);
+  out.lower_offset_px = out.upper_offset_px;
+  std::size_t k = 0;
+  for (int s = first; s <= last; ++s) {
+    while (k + 2 < samples.size() && samples[k + 1].station_px < s) ++k;
+    const RimSample &a = samples[k], &b = samples[k + 1];
+    const double span = b.station_px - a.station_px;
+    if (span > max_gap_px) continue;
+    const double t = span > 0 ? std::clamp((s - a.station_px) / span, 0.0, 1.0) : 0.0;
+    out.upper_offset_px[static_cast<std::size_t>(s - first)] =
+        static_cast<float>(a.upper_px + t * (b.upper_px - a.upper_px));
+    out.lower_offset_px[static_cast<std::size_t>(s - first)] =
+        static_cast<float>(a.lower_px + t * (b.lower_px - a.lower_px));
+  }
+}
+
+Segmentation describe(const BodyPath& path, const WorkingImage& working, const SegmentConfig& config) {
+  const AxisLine line = fit_axis(path);
+  const ObservedPoint from = working.observed(path.columns.front().x_px, line.y_px(path.columns.front().x_px));
+  const ObservedPoint to = working.observed(path.columns.back().x_px, line.y_px(path.columns.back().x_px));
+  const double length = std::hypot(to.x_px - from.x_px, to.y_px - from.y_px);
+
+  Segmentation out;
+  out.direction_x = (to.x_px - from.x_px) / length;
+  out.direction_y = (to.y_px - from.y_px) / length;
+  // A whole pixel as origin, so that an axis along rows or columns is scanned without interpolation.
+  out.origin = {std::round(0.5 * (from.x_px + to.x_px)), std::round(0.5 * (from.y_px + to.y_px))};
+  const auto station = [&](ObservedPoint p) {
+    return (p.x_px - out.origin.x_px) * out.direction_x + (p.y_px - out.origin.y_px) * out.direction_y;
+  };
+  const auto offset = [&](ObservedPoint p) {
+    return (p.y_px - out.origin.y_px) * out.direction_x - (p.x_px - out.origin.x_px) * out.direction_y;
+  };
+  std::vector<RimSample> samples;
+  samples.reserve(path.columns.size());
+  for (const auto& c : path.columns) {
+    const ObservedPoint u = working.observed(c.x_px, c.pair.upper_px), l = working.observed(c.x_px, c.pair.lower_px);
+    samples.push_back({0.5 * (station(u) + station(l)), offset(u), offset(l)});
+  }
+  std::sort(samples.begin(), samples.end(),
+            [](const RimSample& a, const RimSample& b) { return a.station_px < b.station_px; });
+  const double width = path.median_width_px() * working.reduction;
+  resample_rims(samples, std::max(8.0 * working.reduction, config.max_gap_diameters * width), out);
+  out.score = static_cast<double>(path.columns.size()) / path.length_px();
+  return out;
+}
+
+}  // namespace
+
+Result<void> SegmentConfig::validate() const {
+  if (max_reduction < 1 || max_reduction > 16)
+    return invalid_input("segment.max_reduction: expected 1 to 16, found {}", max_reduction);
+  if (!(max_tilt_deg > 0 && max_tilt_deg <= 45))
+    return invalid_input("segment.max_tilt_deg: expected above 0 to 45, found {}", max_tilt_deg);
+  if (!(strong_noise_factor >= weak_noise_factor && weak_noise_factor > 0))
+    return invalid_input("segment.strong_noise_factor: expected at least weak_noise_factor ({}) > 0, found {}",
+                         weak_noise_factor, strong_noise_factor);
+  if (!(strong_angle_deg > 0 && weak_angle_deg >= strong_angle_deg && weak_angle_deg < 90))
+    return invalid_input("segment.weak_angle_deg: expected strong_angle_deg ({}) to below 90, found {}",
+                         strong_angle_deg, weak_angle_deg);
+  if (min_rim_run_px < 1 || max_rims_per_column < 1 || axis_candidates < 1)
+    return invalid_input("segment: min_rim_run_px, max_rims_per_column and axis_candidates must be at least 1");
+  if (!(min_elongation >= 0) || !(min_score >= 0 && min_score <= 1))
+    return invalid_input("segment: expected min_elongation >= 0 and min_score in 0 to 1, found {} and {}",
+                         min_elongation, min_score);
+  return {};
+}
+
+Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& prior, const SegmentConfig& config) {
+  if (image.empty() || image.channels() != 1 || (image.depth() != CV_8U && image.depth() != CV_16U))
+    return invalid_input("segment: expected an image of one channel with 8 or 16 bit, found {} x {}, {} channels",
+                         image.cols, image.rows, image.channels());
+  const double norm = std::hypot(prior.direction_x, prior.direction_y);
+  if (!(std::abs(norm - 1.0) < 1e-3) || !(prior.diameter_min_px > 0) ||
+      !(prior.diameter_max_px >= prior.diameter_min_px))
+    return invalid_input(
+        "segment: expected a unit direction and 0 < diameter_min <= diameter_max, found ({}, {}) and {} to {} px",
+        prior.direction_x, prior.direction_y, prior.diameter_min_px, prior.diameter_max_px);
+  if (std::min(image.cols, image.rows) < 32)
+    return job_failed("no forging: the image has only {} x {} px", image.cols, image.rows);
+
+  const WorkingImage working = make_working_image(image, prior, config);
+  const double r = working.reduction;
+  const RimCandidates rims = find_rim_candidates(working, config);
+  const auto any = [](const auto& columns) {
+    return std::any_of(columns.begin(), columns.end(), [](const auto& c) { return !c.empty(); });
+  };
+  if (!any(rims.upper) && !any(rims.lower)) {
+    return job_failed("no forging: no edge along the axis direction stands out of the noise; is the exposure right?");
+  }
+  const auto pairs = pair_rims(working, rims, prior.diameter_min_px / r, prior.diameter_max_px / r);
+  if (!any(pairs))
+    return job_failed(
+        "no forging: edges were found, but no two of them {:.0f} to {:.0f} px apart with a {} body between",
+        prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
+
+  BodyPath best;
+  const double max_offset = config.max_axis_bow * prior.diameter_min_px / r + 3.0;
+  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, 0.3 * prior.diameter_min_px / r, config)) {
+    const BodyPath path =
+        follow_body(pairs, working, line, max_offset, config.max_gap_diameters * prior.diameter_min_px / r);
+    if (path.length_px() < config.min_elongation * path.median_width_px()) {
+      if (best.length_px() < path.length_px() && best.length_px() < config.min_elongation * best.median_width_px())
+        best = path;
+      continue;
+    }
+    const bool best_is_long = best.length_px() >= config.min_elongation * best.median_width_px();
+    if (best.empty() || !best_is_long || path.evidence > best.evidence) best = path;
+  }
+  if (best.empty() || best.length_px() < config.min_elongation * best.median_width_px())
+    return job_failed(
+        "no forging: the longest body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths "
+        "is needed",
+        best.length_px() * r, best.median_width_px() * r, config.min_elongation);
+  Segmentation found = describe(best, working, config);
+  if (found.score < config.min_score)
+    return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",
+                      100 * found.score, best.length_px() * r, 100 * config.min_score);
+  return found;
+}
+
+}  // namespace imprint

@@ -1,0 +1,215 @@
+#include "node/segment/segment.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <catch2/catch.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "node/segment/segment_config.h"
+#include "tests/unit/node/segment/drawn_forging.h"
+
+namespace imprint {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+const cv::Size kSize(900, 600);
+
+drawn::Body plain_body() {
+  drawn::Body body;
+  body.origin = {450, 300};
+  body.start_px = -300, body.end_px = 300;
+  return body;
+}
+
+SegmentPrior prior(double direction_deg = 0) {
+  SegmentPrior p;
+  p.direction_x = std::cos(direction_deg * kDegree), p.direction_y = std::sin(direction_deg * kDegree);
+  p.diameter_min_px = 60, p.diameter_max_px = 180;
+  return p;
+}
+
+// Largest distance of the expected rims from the drawn ones, ends left out by `margin` stations.
+double worst_rim_error(const Segmentation& found, const drawn::Body& body, double margin = 15) {
+  double worst = 0;
+  const double nx = -found.direction_y, ny = found.direction_x;
+  for (std::size_t i = 0; i < found.upper_offset_px.size(); ++i) {
+    const double station = found.first_station_px + static_cast<double>(i);
+    for (const bool upper : {true, false}) {
+      const double offset = upper ? found.upper_offset_px[i] : found.lower_offset_px[i];
+      if (std::isnan(offset)) continue;
+      const cv::Vec2d p = body.along_and_across(found.origin.x_px + station * found.direction_x + offset * nx,
+                                                found.origin.y_px + station * found.direction_y + offset * ny);
+      if (p[0] < body.start_px + margin || p[0] > body.end_px - margin) continue;
+      const double across = std::abs(p[1] - body.middle_px(p[0]));
+      worst = std::max(worst, std::abs(across - body.half_width_px(p[0])));
+    }
+  }
+  return worst;
+}
+
+double length_px(const Segmentation& found) { return static_cast<double>(found.upper_offset_px.size()); }
+
+}  // namespace
+
+TEST_CASE("segment: a glowing body is found with both rims and its extent") {
+  const drawn::Body body = plain_body();
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 1), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 3);  // the image is reduced by 3
+  CHECK(std::abs(length_px(*found) - 600) < 24);
+  CHECK(found->score > 0.95);
+  CHECK(found->direction_x > 0.999);
+}
+
+TEST_CASE("segment: any orientation, both senses of the prior's direction") {
+  for (const double angle : {30.0, 90.0, 137.0, 180.0, -60.0}) {
+    drawn::Body body = plain_body();
+    body.tilt_rad = angle * kDegree;
+    body.start_px = -230, body.end_px = 200;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 2), prior(angle), {});
+    INFO("angle " << angle);
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 4);
+    CHECK(found->direction_x * std::cos(body.tilt_rad) + found->direction_y * std::sin(body.tilt_rad) > 0.999);
+    CHECK(found->upper_offset_px[50] < found->lower_offset_px[50]);
+  }
+}
+
+TEST_CASE("segment: tilted against the prior") {
+  for (const double tilt : {-8.0, -5.0, 3.0, 8.0}) {
+    drawn::Body body = plain_body();
+    body.tilt_rad = tilt * kDegree;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 3), prior(), {});
+    INFO("tilt " << tilt);
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 4);
+    CHECK(std::abs(length_px(*found) - 600) < 30);
+  }
+}
+
+TEST_CASE("segment: dark on bright, 16 bit, low contrast and saturation") {
+  drawn::Body body = plain_body();
+  SegmentPrior p = prior();
+  SECTION("dark on bright") {
+    body.level = 40, body.background = 220;
+    p.polarity = Polarity::dark;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 4), p, {});
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 3);
+  }
+  SECTION("25 grey levels of 255, noise 3") {
+    body.level = 55;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 5), p, {});
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 4);
+  }
+  SECTION("16 bit, a twentieth of its range") {
+    body.level = 14, body.background = 2;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 0.5, 6, CV_16U), p, {});
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 3);
+  }
+  SECTION("saturated") {
+    body.level = 600;
+    const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 7), p, {});
+    REQUIRE(found);
+    CHECK(worst_rim_error(*found, body) < 4);
+  }
+}
+
+TEST_CASE("segment: steps of the diameter are followed") {
+  drawn::Body body = plain_body();
+  body.half_width_px = [](double s) { return s < -100 ? 38.0 : s < 120 ? 75.0 : 45.0; };
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 8), prior(), {});
+  REQUIRE(found);
+  int wrong = 0;
+  for (std::size_t i = 0; i < found->upper_offset_px.size(); ++i) {
+    const double station = found->first_station_px + static_cast<double>(i) + found->origin.x_px - body.origin.x_px;
+    if (std::abs(station + 100) < 10 || std::abs(station - 120) < 10 || std::abs(station) > 285) continue;
+    wrong += std::abs(0.5 * (found->lower_offset_px[i] - found->upper_offset_px[i]) - body.half_width_px(station)) > 3;
+  }
+  CHECK(wrong == 0);
+  CHECK(std::abs(length_px(*found) - 600) < 24);
+}
+
+TEST_CASE("segment: scale that interrupts the rims does not end the body") {
+  drawn::Body body = plain_body();
+  body.patches = {{-120, -60, true, 20, 32}, {-20, 30, false, 25, 32}, {100, 150, true, 15, 60}};
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 9), prior(), {});
+  REQUIRE(found);
+  CHECK(std::abs(length_px(*found) - 600) < 24);
+}
+
+TEST_CASE("segment: brighter beams, plates and lamps do not win") {
+  drawn::Body body = plain_body();
+  body.origin = {450, 330};
+  body.level = 110;
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  drawn::draw_bar(image, {0, 20, 900, 30}, 250);   // a beam narrower than the range
+  drawn::draw_bar(image, {0, 100, 900, 22}, 240);  // two beams as far apart as a forging is wide
+  drawn::draw_bar(image, {0, 200, 900, 22}, 240);
+  drawn::draw_bar(image, {30, 420, 100, 100}, 255);  // plates with black middles
+  drawn::draw_bar(image, {50, 440, 60, 60}, 5);
+  drawn::draw_bar(image, {700, 430, 110, 90}, 255);
+  drawn::draw_bar(image, {850, 0, 20, 600}, 230);  // an upright
+  cv::circle(image, {300, 500}, 40, cv::Scalar(255), -1);
+  const auto found = segment_forging(drawn::expose(image, 3, 10), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 4);
+}
+
+TEST_CASE("segment: a body that is wider than the rig allows is not taken") {
+  drawn::Body body = plain_body();
+  body.half_width_px = [](double) { return 50.0; };
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  drawn::draw_bar(image, {0, 380, 900, 215}, 240);
+  const auto found = segment_forging(drawn::expose(image, 3, 11), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 4);
+}
+
+TEST_CASE("segment: out of view on one side") {
+  drawn::Body body = plain_body();
+  body.end_px = 700;
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 12), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 3);
+  CHECK(found->origin.x_px + found->first_station_px + length_px(*found) > 870);
+}
+
+TEST_CASE("segment: no forging is an error that says what was missing") {
+  const auto message = [](const cv::Mat& image) {
+    const auto found = segment_forging(image, prior(), {});
+    REQUIRE_FALSE(found);
+    CHECK(found.error().kind == ErrorKind::job_failed);
+    return found.error().message;
+  };
+  CHECK(message(cv::Mat::zeros(kSize, CV_8U)).find("no edge") != std::string::npos);
+  CHECK(message(cv::Mat(kSize, CV_8U, cv::Scalar(255))).find("no edge") != std::string::npos);
+  CHECK(message(cv::Mat(kSize, CV_16U, cv::Scalar(65535))).find("no edge") != std::string::npos);
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    CHECK_FALSE(message(drawn::expose(cv::Mat_<float>(kSize, 20.0F), 3, seed)).empty());
+    cv::Mat_<float> hall(kSize, 20.0F);
+    drawn::draw_bar(hall, {0, 60, 900, 30}, 200);
+    drawn::draw_bar(hall, {0, 300, 900, 20}, 120);
+    drawn::draw_bar(hall, {200, 330, 100, 110}, 255);
+    drawn::draw_bar(hall, {600, 350, 120, 100}, 255);
+    CHECK_FALSE(message(drawn::expose(hall, 3, seed)).empty());
+  }
+}
+
+TEST_CASE("segment: unusable input is refused") {
+  CHECK(segment_forging(cv::Mat(), prior(), {}).error().kind == ErrorKind::invalid_input);
+  CHECK(segment_forging(cv::Mat::zeros(kSize, CV_8UC3), prior(), {}).error().kind == ErrorKind::invalid_input);
+  CHECK_FALSE(segment_forging(cv::Mat::zeros(3, 900, CV_8U), prior(), {}));
+  SegmentPrior p = prior();
+  p.diameter_max_px = 10;
+  CHECK(segment_forging(cv::Mat::zeros(kSize, CV_8U), p, {}).error().kind == ErrorKind::invalid_input);
+  CHECK(SegmentConfig{}.validate());
+  SegmentConfig config;
+  config.max_tilt_deg = 90;
+  CHECK_FALSE(config.validate());
+}
+
+}  // namespace imprint
