@@ -1,0 +1,232 @@
+#include "fusion/combine/combine.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fusion/combine/alignment.h"
+#include "fusion/combine/circularity.h"
+#include "fusion/combine/combine_config.h"
+#include "fusion/combine/joint_estimate.h"
+#include "fusion/triangulate/end_planes.h"
+
+namespace imprint {
+namespace {
+
+/// Radius just before an end, where its circle is.
+double end_radius(const AxisCurve& axis, std::span<const double> radius_mm, double end_section_mm, bool last) {
+  const std::size_t n = radius_mm.size();
+  const auto window = std::clamp<std::size_t>(static_cast<std::size_t>(0.5 * end_section_mm / axis.x_step_mm), 3, n / 2);
+  std::vector<double> values(last ? radius_mm.end() - static_cast<std::ptrdiff_t>(window) : radius_mm.begin(),
+                             last ? radius_mm.end() : radius_mm.begin() + static_cast<std::ptrdiff_t>(window));
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(window / 2), values.end());
+  return values[window / 2];
+}
+
+/// Both ends and every observation's shift along x, from all end readings.
+EndPlanes find_ends(std::span<const ObservedForging> observations, std::span<const Placement> placements,
+                    const AxisCurve& axis, std::span<const double> radius_mm, double shift_sigma_mm,
+                    const ForgingSpec& forging, const CombineConfig& config) {
+  std::vector<EndPoint> points;
+  const double length = axis.x_step_mm * static_cast<double>(axis.yz_mm.size() - 1);
+  const double radius_first = end_radius(axis, radius_mm, forging.end_section_mm, false);
+  const double radius_last = end_radius(axis, radius_mm, forging.end_section_mm, true);
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    for (const EndReading& reading : observations[k].ends) {
+      const CameraShare& share = observations[k].cameras[static_cast<std::size_t>(reading.camera)];
+      const auto met = meet_end_circle(axis, placements[k].point(share.pose.center_world_mm),
+                                       placements[k].R * reading.ray_world, reading.last ? radius_last : radius_first,
+                                       reading.last, reading.last ? length : 0.0);
+      if (!met) continue;
+      const Eigen::Vector3d center = axis.at(met->x()).point_mm;
+      points.push_back({.observation = static_cast<int>(k), .last = reading.last, .x_mm = met->x(),
+                        .beside_mm = (*met - center).tail<2>(), .sigma_mm = reading.sigma_mm});
+    }
+  }
+  EndPriors priors;
+  priors.tilt_sigma_rad = config.end_tilt_sigma_deg * M_PI / 180.0;
+  priors.shift_sigma_mm = shift_sigma_mm;
+  priors.scatter_mm = 1e-3 * radius_first;
+  EndPlanes planes = fit_end_planes(points, static_cast<int>(observations.size()), priors);
+  // An end nobody saw lies where the first observation's rims stop.
+  if (!planes.first.seen) planes.first.x_mm = 0.0;
+  if (!planes.last.seen) planes.last.x_mm = length;
+  const double unseen = std::pow(5.0 * axis.x_step_mm, 2);
+  for (const int end : {0, 1}) {
+    if (end == 0 ? planes.first.seen : planes.last.seen) continue;
+    planes.covariance_mm2.row(end).setZero();
+    planes.covariance_mm2.col(end).setZero();
+    planes.covariance_mm2(end, end) = unseen;
+  }
+  return planes;
+}
+
+/// Radius along `axis` from the first observation's own tangents.
+std::vector<double> first_radii(const ObservedForging& observed, double step_mm, std::size_t nodes) {
+  std::vector<std::vector<double>> seen(nodes);
+  for (const ObservedSection& section : observed.sections)
+    for (const TangentPlane& tangent : section.tangents) {
+      const auto i = static_cast<std::size_t>(std::clamp<long>(std::lround(tangent.s_mm / step_mm), 0, static_cast<long>(nodes) - 1));
+      seen[i].push_back(tangent.offset_mm - tangent.normal_world.dot(section.axis_world_mm));
+    }
+  std::vector<double> radii(nodes, 0.0);
+  double previous = observed.radius_mm;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (!seen[i].empty()) {
+      std::nth_element(seen[i].begin(), seen[i].begin() + static_cast<std::ptrdiff_t>(seen[i].size() / 2), seen[i].end());
+      previous = seen[i][seen[i].size() / 2];
+    }
+    radii[i] = previous;
+  }
+  return radii;
+}
+
+/// The first observation's axis in its own frame, over [0, length].
+AxisCurve first_axis(const ObservedForging& observed, const Placement& placement, double length_mm, int nodes) {
+  AxisCurve source;
+  source.x_first_mm = 0.0;
+  const auto count = observed.sections.size();
+  const double observed_length = (observed.end_world_mm - observed.start_world_mm).norm();
+  source.x_step_mm = observed_length / static_cast<double>(count - 1);
+  for (const ObservedSection& section : observed.sections) {
+    const Eigen::Vector3d p = placement.point(section.axis_world_mm);
+    source.yz_mm.emplace_back(p.y(), p.z());
+  }
+  source.set_slopes();
+  AxisCurve axis;
+  axis.x_step_mm = length_mm / (nodes - 1);
+  for (int i = 0; i < nodes; ++i) axis.yz_mm.emplace_back(source.at(i * axis.x_step_mm).point_mm.tail<2>());
+  axis.set_slopes();
+  return axis;
+}
+
+/// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
+void align(const JointEstimate& joint, const EndPlanes& ends, double end_section_mm, int sections, CombinedForging& combined) {
+  const std::size_t n = joint.nodes.size();
+  std::vector<double> x(n);
+  std::vector<Eigen::Vector2d> yz(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    x[i] = static_cast<double>(i) * joint.step_mm;
+    yz[i] = {joint.nodes[i](kY), joint.nodes[i](kZ)};
+  }
+  const IdealAxis line = ideal_axis(x, yz, ends.first.x_mm, ends.last.x_mm, end_section_mm);
+  const Placement& world = joint.placements.front();
+  const Eigen::Vector3d direction(1.0, line.slope.x(), line.slope.y());
+  combined.R_forging_world = forging_axes(world.R.transpose() * direction);
+  combined.origin_world_mm = world.R.transpose() * (line.at(ends.first.x_mm) - world.shift_mm);
+  combined.length_mm = (ends.last.x_mm - ends.first.x_mm) * direction.norm();
+  const Eigen::Matrix3d R = combined.R_forging_world * world.R.transpose();  // aligned from working frame
+  const Eigen::Vector3d origin = line.at(ends.first.x_mm);
+
+  // The ideal axis is made of the same uncertain points: its sums go along.
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n) * kNodeUnknowns, 4);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = static_cast<Eigen::Index>(i) * kNodeUnknowns;
+    sums(row + kY, 0) = sums(row + kZ, 2) = line.level_weight[i];
+    sums(row + kY, 1) = sums(row + kZ, 3) = line.slope_weight[i];
+  }
+  const Eigen::MatrixXd with_sums = joint.system.covariance_with(sums);
+  const Eigen::Matrix4d of_sums = sums.transpose() * with_sums;
+  const double place_variance = ends.covariance_mm2(0, 0);
+
+  const double step = combined.length_mm / (sections - 1);
+  std::size_t k = 0;
+  std::vector<Eigen::Vector3d> aligned(n);
+  for (std::size_t i = 0; i < n; ++i) aligned[i] = R * (Eigen::Vector3d(x[i], yz[i].x(), yz[i].y()) - origin);
+  for (int s = 0; s < sections; ++s) {
+    CombinedSection section;
+    section.s_mm = s * step;
+    while (k + 2 < n && aligned[k + 1].x() < section.s_mm) ++k;
+    const double u = (section.s_mm - aligned[k].x()) / (aligned[k + 1].x() - aligned[k].x());
+    section.axis_mm = (1.0 - u) * aligned[k] + u * aligned[k + 1];
+    const std::size_t i = u < 0.5 ? k : k + 1;
+    const NodeVector& node = joint.nodes[i];
+    const NodeMatrix& covariance = joint.covariance[i];
+    const auto row = static_cast<Eigen::Index>(i) * kNodeUnknowns;
+    const double lever = x[i] - line.x_mean_mm;
+    Eigen::Matrix<double, 2, 4> line_effect;
+    line_effect << 1.0, lever, 0.0, 0.0, 0.0, 0.0, 1.0, lever;
+    Eigen::Matrix<double, 2, 4> cross;
+    cross.row(0) = with_sums.row(row + kY);
+    cross.row(1) = with_sums.row(row + kZ);
+    Eigen::Matrix2d own;
+    own << covariance(kY, kY), covariance(kY, kZ), covariance(kZ, kY), covariance(kZ, kZ);
+    const Eigen::Matrix2d shared = cross * line_effect.transpose();
+    section.axis_covariance_mm2 = own - shared - shared.transpose() + line_effect * of_sums * line_effect.transpose();
+
+    const double radius = (1.0 - u) * joint.nodes[k](kRadius) + u * joint.nodes[k + 1](kRadius);
+    // At a shoulder the section's place along the axis counts too.
+    const double gradient = (joint.nodes[k + 1](kRadius) - joint.nodes[k](kRadius)) / joint.step_mm;
+    const double from_place = gradient * gradient * (place_variance + joint.step_mm * joint.step_mm / 12.0);
+    section.diameter_mm = 2.0 * radius;
+    section.diameter_sigma_mm = 2.0 * std::sqrt(covariance(kRadius, kRadius) + from_place);
+    const Circularity circle = circularity(node, covariance);
+    section.circularity_mm = circle.value_mm;
+    section.circularity_sigma_mm = circle.sigma_mm;
+    combined.sections.push_back(section);
+  }
+}
+
+}  // namespace
+
+Result<void> CombineConfig::validate() const {
+  if (sections < 10) return invalid_input("combine.sections: at least 10 expected, found {}", sections);
+  if (iterations < 2) return invalid_input("combine.iterations: at least 2 expected, found {}", iterations);
+  if (!(rotation_tolerance_deg > 0.0) || !(placing_sigma_mm > 0.0) || !(end_tilt_sigma_deg > 0.0))
+    return invalid_input("combine: rotation_tolerance_deg, placing_sigma_mm and end_tilt_sigma_deg above 0 expected");
+  if (!(out_of_round_share > 0.0) || !(out_of_round_length_share > 0.0))
+    return invalid_input("combine: out_of_round_share and out_of_round_length_share above 0 expected");
+  return {};
+}
+
+Result<CombinedForging> combine(std::span<const ObservedForging> observations, std::span<const double> rotations_deg,
+                                const ForgingSpec& forging, const CombineConfig& config) {
+  if (observations.empty()) return job_failed("no observation to combine");
+  if (rotations_deg.size() != observations.size())
+    return invalid_input("{} observations came with {} rotations", observations.size(), rotations_deg.size());
+  CombinedForging combined;
+  std::vector<Placement> placements;
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    const ObservedForging& observed = observations[k];
+    if (observed.sections.size() < 2 || !(observed.end_world_mm - observed.start_world_mm).allFinite() ||
+        !((observed.end_world_mm - observed.start_world_mm).norm() > 0.0))
+      return job_failed("observation {} has no length to align", k);
+    if (!std::isfinite(rotations_deg[k])) return invalid_input("observation {}: its rotation is not a number", k);
+    Placement placement = pre_align(observed, forging.end_section_mm);
+    const Eigen::Matrix3d back = turn_about_x(-(rotations_deg[k] - rotations_deg[0]) * M_PI / 180.0);
+    placement.R = back * placement.R;
+    placement.shift_mm = back * placement.shift_mm;
+    placements.push_back(placement);
+  }
+
+  // Ends first, so that the observations lie on each other along x, then all tangents together.
+  const int nodes = config.sections;
+  double length = (observations[0].end_world_mm - observations[0].start_world_mm).norm();
+  AxisCurve axis = first_axis(observations[0], placements[0], length, nodes);
+  std::vector<double> radii = first_radii(observations[0], axis.x_step_mm, axis.yz_mm.size());
+  EndPlanes ends = find_ends(observations, placements, axis, radii, config.placing_sigma_mm, forging, config);
+  for (std::size_t k = 0; k < placements.size(); ++k) placements[k].shift_mm.x() += ends.shift_mm[k] - ends.first.x_mm;
+  length = ends.last.x_mm - ends.first.x_mm;
+  if (!(length > 0.0)) return job_failed("the ends of the observations do not enclose a forging");
+  axis = first_axis(observations[0], placements[0], length, nodes);
+
+  const double shift_sigma = std::max(ends.length_sigma_mm(), 1e-3 * observations[0].radius_mm);
+  auto joint = estimate_jointly(observations, placements, axis, radii, shift_sigma, config);
+  if (!joint) return job_failed("the tangents of the observations do not determine a forging");
+
+  radii.clear();
+  for (const NodeVector& node : joint->nodes) radii.push_back(node(kRadius));
+  const double fixed = placements.size() > 1 ? *std::max_element(joint->shift_sigma_mm.begin(), joint->shift_sigma_mm.end()) : 1.0;
+  ends = find_ends(observations, joint->placements, joint->axis(), radii, std::max(fixed, 1e-4), forging, config);
+  if (!(ends.last.x_mm - ends.first.x_mm > 0.0)) return job_failed("the ends of the observations do not enclose a forging");
+  align(*joint, ends, forging.end_section_mm, config.sections, combined);
+  combined.length_sigma_mm = ends.length_sigma_mm();
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    const double own = (observations[k].end_world_mm - observations[k].start_world_mm).norm();
+    if (std::abs(own - combined.length_mm) > config.max_length_difference_mm)
+      combined.warnings.push_back(fmt::format("observation {}: its own length {:.1f} mm differs from {:.1f} mm of all together",
+                                              k, own, combined.length_mm));
+  }
+  return combined;
+}
+
+}  // namespace imprint

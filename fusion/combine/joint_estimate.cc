@@ -1,0 +1,387 @@
+#include "fusion/combine/joint_estimate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "lib/geometry/rotation.h"
+
+namespace imprint {
+namespace {
+
+constexpr int kCameraUnknowns = 2;   // its place across the axis, at both ends
+constexpr int kPlaceUnknowns = 6;    // shift x, y, z and turn about x, y, z of an observation
+constexpr double kFreedom = 4.0;     // of Student's t for the tangents
+
+/// One camera of one observation.
+struct Viewer {
+  std::size_t observation = 0;
+  Eigen::Vector3d center_world_mm;
+  Matrix6d pose_covariance = Matrix6d::Zero();
+  Eigen::Matrix3d R_cam_world;
+  int column = 0;  ///< of its unknowns in the border
+};
+
+/// One tangent, ordered along its rim.
+struct Row {
+  std::size_t viewer = 0;
+  Eigen::Vector3d ray_world;
+  double variance_mm2 = 1.0;  ///< stated, weight included
+  bool continues = false;     ///< the same rim as the row before, one station on
+  double x_mm = 0.0;
+  double residual_mm = 0.0;
+  double trust = 1.0;
+  bool used = false;
+};
+
+/// A row put into the equations.
+struct Equation {
+  std::size_t node = 0;
+  double share = 0.0;  ///< of the next node
+  Eigen::Vector3d normal;
+  NodeVector coefficients = NodeVector::Zero();
+  double value_mm = 0.0;
+  double across = 0.0;  ///< effect of the camera's place
+};
+
+class JointSolver {
+ public:
+  JointSolver(std::span<const ObservedForging> observations, std::vector<Placement> placements, const AxisCurve& start,
+              std::span<const double> start_radius_mm, double shift_sigma_mm, const CombineConfig& config)
+      : config_(config),
+        placements_(std::move(placements)),
+        step_mm_(start.x_step_mm),
+        length_mm_(start.x_step_mm * static_cast<double>(start.yz_mm.size() - 1)),
+        shift_sigma_mm_(shift_sigma_mm),
+        radius_mm_(median(start_radius_mm)),
+        prior_(static_cast<int>(start.yz_mm.size()), start.x_step_mm, radius_mm_, config.out_of_round_share,
+               config.out_of_round_length_share * length_mm_),
+        system_(0, 0) {
+    nodes_.assign(start.yz_mm.size(), NodeVector::Zero());
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      nodes_[i](kY) = start.yz_mm[i].x();
+      nodes_[i](kZ) = start.yz_mm[i].y();
+      nodes_[i](kYSlope) = start.slope[i].x();
+      nodes_[i](kZSlope) = start.slope[i].y();
+      nodes_[i](kRadius) = start_radius_mm[i];
+    }
+    collect_rows(observations);
+    place_sum_.assign(observations.size(), Vector6d::Zero());
+    camera_solution_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(viewers_.size()) * kCameraUnknowns);
+    // Start wide: what the first axis leaves over must not be taken for faults.
+    noise_scale_ = 0.01 * radius_mm_ / std::sqrt(median_variance());
+  }
+
+  std::optional<JointEstimate> run() {
+    for (int iteration = 0; iteration < config_.iterations; ++iteration) {
+      if (!iterate(iteration + 1 == config_.iterations)) return std::nullopt;
+    }
+    JointEstimate estimate;
+    estimate.step_mm = step_mm_;
+    estimate.nodes = nodes_;
+    estimate.covariance = std::move(own_);
+    system_.add_border_covariance(estimate.covariance);
+    estimate.placements = placements_;
+    estimate.scatter_share = noise_scale_;
+    estimate.shift_sigma_mm.assign(placements_.size(), 0.0);
+    const Eigen::MatrixXd border = system_.border_covariance();
+    for (std::size_t k = 1; k < placements_.size(); ++k)
+      estimate.shift_sigma_mm[k] = std::sqrt(border(place_column(k), place_column(k)));
+    estimate.system = std::move(system_);
+    return estimate;
+  }
+
+ private:
+  static double median(std::span<const double> values) {
+    std::vector<double> sorted(values.begin(), values.end());
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+    return sorted[sorted.size() / 2];
+  }
+
+  double median_variance() const {
+    std::vector<double> values;
+    for (const Row& row : rows_) values.push_back(row.variance_mm2);
+    return values.empty() ? 1.0 : median(values);
+  }
+
+  int place_column(std::size_t observation) const {
+    return static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(observation - 1) * kPlaceUnknowns;
+  }
+
+  void collect_rows(std::span<const ObservedForging> observations) {
+    for (std::size_t k = 0; k < observations.size(); ++k) {
+      const ObservedForging& observed = observations[k];
+      for (std::size_t c = 0; c < observed.cameras.size(); ++c) {
+        const CameraShare& share = observed.cameras[c];
+        if (share.excluded) continue;
+        Viewer viewer{.observation = k, .center_world_mm = share.pose.center_world_mm, .pose_covariance = share.pose.covariance,
+                      .R_cam_world = share.pose.R_cam_world, .column = static_cast<int>(viewers_.size()) * kCameraUnknowns};
+        if (!viewer.pose_covariance.allFinite()) viewer.pose_covariance.setZero();
+        viewer.pose_covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(observed.disagreement_sigma_mm, 2);
+        for (const bool upper : {true, false}) {
+          const std::size_t first = rows_.size();
+          for (const ObservedSection& section : observed.sections)
+            for (const TangentPlane& tangent : section.tangents)
+              if (tangent.camera == static_cast<int>(c) && tangent.upper == upper && tangent.weight > 0.0)
+                rows_.push_back({.viewer = viewers_.size(), .ray_world = tangent.ray_world,
+                                 .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight, .x_mm = tangent.s_mm});
+          std::sort(rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.end(), [](const Row& a, const Row& b) { return a.x_mm < b.x_mm; });
+          for (std::size_t i = first + 1; i < rows_.size(); ++i) rows_[i].continues = true;
+        }
+        viewers_.push_back(viewer);
+      }
+    }
+  }
+
+  AxisCurve axis() const {
+    AxisCurve curve;
+    curve.x_step_mm = step_mm_;
+    for (const NodeVector& node : nodes_) {
+      curve.yz_mm.emplace_back(node(kY), node(kZ));
+      curve.slope.emplace_back(node(kYSlope), node(kZSlope));
+    }
+    return curve;
+  }
+
+  std::optional<Equation> equation_of(Row& row, const AxisCurve& curve) const {
+    const Viewer& viewer = viewers_[row.viewer];
+    const Placement& placement = placements_[viewer.observation];
+    const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
+    const auto contact = touch(curve, center, placement.R * row.ray_world, row.x_mm);
+    if (!contact) return std::nullopt;
+    row.x_mm = contact->x_mm;
+    const double position = row.x_mm / step_mm_;
+    const auto last = static_cast<double>(nodes_.size() - 1);
+    if (position < -0.25 || position > last + 0.25) return std::nullopt;
+    Equation equation;
+    equation.node = static_cast<std::size_t>(std::clamp(std::floor(position), 0.0, last - 1.0));
+    equation.share = std::clamp(position - static_cast<double>(equation.node), 0.0, 1.0);
+    equation.normal = contact->normal;
+    const double theta = std::atan2(contact->normal.z(), contact->normal.y());
+    NodeVector& g = equation.coefficients;
+    g(kY) = contact->normal.y();
+    g(kZ) = contact->normal.z();
+    g(kRadius) = 1.0;
+    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
+      g(cosine_of(order)) = std::cos(order * theta);
+      g(sine_of(order)) = std::sin(order * theta);
+    }
+    equation.value_mm = contact->offset_mm - contact->normal.x() * row.x_mm;
+    const Eigen::Vector3d view = (curve.at(row.x_mm).point_mm - center).normalized();
+    equation.across = contact->normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
+    return equation;
+  }
+
+  /// Columns of the observation's place: how the model at this tangent moves with it.
+  Vector6d place_effect(const Equation& equation, double x_mm) const {
+    const std::size_t i = equation.node;
+    const NodeVector node = (1.0 - equation.share) * nodes_[i] + equation.share * nodes_[i + 1];
+    const Eigen::Vector3d lever(x_mm - 0.5 * length_mm_, node(kY), node(kZ));
+    const NodeVector& g = equation.coefficients;
+    double turn = 0.0;
+    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order)
+      turn += order * (node(sine_of(order)) * g(cosine_of(order)) - node(cosine_of(order)) * g(sine_of(order)));
+    Vector6d effect;
+    effect.head<3>() = -equation.normal;
+    effect(0) += (nodes_[i + 1](kRadius) - nodes_[i](kRadius)) / step_mm_;
+    effect.tail<3>() = equation.normal.cross(lever);
+    effect(3) += turn;
+    return effect;
+  }
+
+  void add_camera_priors() {
+    for (const Viewer& viewer : viewers_) {
+      const Placement& placement = placements_[viewer.observation];
+      const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
+      Eigen::Matrix<double, 2, 6> effect;
+      for (int end = 0; end < 2; ++end) {
+        const NodeVector& node = end == 0 ? nodes_.front() : nodes_.back();
+        const Eigen::Vector3d point(end * length_mm_, node(kY), node(kZ));
+        const Eigen::Vector3d across = (point - center).cross(Eigen::Vector3d::UnitX()).normalized();
+        const Eigen::Vector3d across_world = placement.R.transpose() * across;
+        const Eigen::Vector3d point_cam = viewer.R_cam_world * placement.R.transpose() * (point - center);
+        effect.block<1, 3>(end, 0) = across_world.transpose();
+        effect.block<1, 3>(end, 3) = -point_cam.cross(viewer.R_cam_world * across_world).transpose();
+      }
+      Eigen::Matrix2d covariance = effect * viewer.pose_covariance * effect.transpose();
+      covariance.diagonal().array() += std::pow(1e-5 * radius_mm_, 2);
+      system_.corner.block<2, 2>(viewer.column, viewer.column) += covariance.inverse();
+    }
+  }
+
+  void add_place_priors() {
+    const double turn_x = config_.rotation_tolerance_deg * M_PI / 180.0;
+    Vector6d sigma;
+    sigma << shift_sigma_mm_, config_.placing_sigma_mm, config_.placing_sigma_mm, turn_x, 0.02, 0.02;
+    for (std::size_t k = 1; k < placements_.size(); ++k) {
+      for (int j = 0; j < kPlaceUnknowns; ++j) {
+        const double information = 1.0 / (sigma(j) * sigma(j));
+        system_.corner(place_column(k) + j, place_column(k) + j) += information;
+        system_.border_right(place_column(k) + j) -= information * place_sum_[k](j);
+      }
+    }
+  }
+
+  bool iterate(bool final) {
+    const int border = static_cast<int>(viewers_.size()) * kCameraUnknowns +
+                       static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
+    system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
+    prior_.add_to(system_);
+    add_camera_priors();
+    add_place_priors();
+    const AxisCurve curve = axis();
+    std::vector<std::optional<Equation>> equations;
+    equations.reserve(rows_.size());
+    for (Row& row : rows_) {
+      equations.push_back(equation_of(row, curve));
+      if (equations.back()) add_equation(row, *equations.back());
+    }
+    if (!system_.solve()) return false;
+    system_.node_covariances(own_, with_next_);
+    nodes_ = system_.node_solution;
+    camera_solution_ = system_.border_solution.head(camera_solution_.size());
+    find_residuals(equations);
+    move_places();
+    // The last round leaves amounts and solution belonging to each other.
+    if (final) return true;
+    learn_noise(equations);
+    prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()));
+    return true;
+  }
+
+  void add_equation(const Row& row, const Equation& equation) {
+    const double w = row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_);
+    const std::size_t i = equation.node;
+    const double next = equation.share;
+    const double here = 1.0 - next;
+    const NodeVector& g = equation.coefficients;
+    const NodeMatrix square = w * g * g.transpose();
+    system_.diagonal[i] += here * here * square;
+    system_.diagonal[i + 1] += next * next * square;
+    system_.upper[i] += here * next * square;
+    system_.right[i] += w * here * equation.value_mm * g;
+    system_.right[i + 1] += w * next * equation.value_mm * g;
+
+    const Viewer& viewer = viewers_[row.viewer];
+    const double along = std::clamp(row.x_mm / length_mm_, 0.0, 1.0);
+    std::array<int, kCameraUnknowns + kPlaceUnknowns> columns{viewer.column, viewer.column + 1};
+    std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.across * (1.0 - along), equation.across * along};
+    std::size_t count = kCameraUnknowns;
+    if (viewer.observation > 0) {
+      const Vector6d effect = place_effect(equation, row.x_mm);
+      for (int j = 0; j < kPlaceUnknowns; ++j) {
+        columns[count] = place_column(viewer.observation) + j;
+        effects[count++] = effect(j);
+      }
+    }
+    const auto first = static_cast<Eigen::Index>(i) * kNodeUnknowns;
+    for (std::size_t a = 0; a < count; ++a) {
+      const double weighted = w * effects[a];
+      system_.border.col(columns[a]).segment<kNodeUnknowns>(first) += weighted * here * g;
+      system_.border.col(columns[a]).segment<kNodeUnknowns>(first + kNodeUnknowns) += weighted * next * g;
+      system_.border_right(columns[a]) += weighted * equation.value_mm;
+      for (std::size_t b = 0; b < count; ++b) system_.corner(columns[a], columns[b]) += weighted * effects[b];
+    }
+  }
+
+  void find_residuals(std::span<const std::optional<Equation>> equations) {
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      Row& row = rows_[r];
+      row.used = equations[r].has_value();
+      if (!row.used) continue;
+      const Equation& equation = *equations[r];
+      const Viewer& viewer = viewers_[row.viewer];
+      const NodeVector node = (1.0 - equation.share) * nodes_[equation.node] + equation.share * nodes_[equation.node + 1];
+      const double along = std::clamp(row.x_mm / length_mm_, 0.0, 1.0);
+      double model = equation.coefficients.dot(node) +
+                     equation.across * ((1.0 - along) * camera_solution_(viewer.column) + along * camera_solution_(viewer.column + 1));
+      if (viewer.observation > 0)
+        model += place_effect(equation, row.x_mm).dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
+      row.residual_mm = equation.value_mm - model;
+    }
+  }
+
+  void move_places() {
+    const Eigen::Vector3d middle(0.5 * length_mm_, 0.0, 0.0);
+    for (std::size_t k = 1; k < placements_.size(); ++k) {
+      const Vector6d move = system_.border_solution.segment<kPlaceUnknowns>(place_column(k));
+      place_sum_[k] += move;
+      const Eigen::Matrix3d turn = rotation_from_vector(move.tail<3>());
+      placements_[k].R = turn * placements_[k].R;
+      placements_[k].shift_mm = turn * (placements_[k].shift_mm - middle) + middle + move.head<3>();
+    }
+  }
+
+  /// Scatter of the tangents about the model, how far it is correlated along the rims, and whom to trust.
+  void learn_noise(std::span<const std::optional<Equation>> equations) {
+    double sum = 0.0;
+    double count = 0.0;
+    double neighbours = 0.0;
+    double squares = 0.0;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      Row& row = rows_[r];
+      if (!row.used) continue;
+      const Equation& e = *equations[r];
+      const NodeVector& g = e.coefficients;
+      const double here = 1.0 - e.share;
+      const double fitted = here * here * g.dot(own_[e.node] * g) + e.share * e.share * g.dot(own_[e.node + 1] * g) +
+                            2.0 * here * e.share * g.dot(with_next_[e.node] * g);
+      const double expected = row.residual_mm * row.residual_mm + fitted;
+      const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
+      row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance);
+      sum += row.trust * expected / row.variance_mm2;
+      count += 1.0;
+      if (row.continues && r > 0 && rows_[r - 1].used) {
+        const double here_trust = std::sqrt(row.trust * rows_[r - 1].trust / (row.variance_mm2 * rows_[r - 1].variance_mm2));
+        neighbours += here_trust * row.residual_mm * rows_[r - 1].residual_mm;
+        squares += 0.5 * (row.trust * row.residual_mm * row.residual_mm / row.variance_mm2 +
+                          rows_[r - 1].trust * rows_[r - 1].residual_mm * rows_[r - 1].residual_mm / rows_[r - 1].variance_mm2);
+      }
+    }
+    if (count < 1.0) return;
+    // Never below a fifth of the stated sigma: exact input must not make the equations singular.
+    noise_scale_ = std::max(0.2, std::sqrt(sum / count));
+    const double correlation = squares > 0.0 ? std::clamp(neighbours / squares, 0.0, 0.9) : 0.0;
+    correlation_ = (1.0 + correlation) / (1.0 - correlation);
+  }
+
+  CombineConfig config_;
+  std::vector<Placement> placements_;
+  double step_mm_;
+  double length_mm_;
+  double shift_sigma_mm_;
+  double radius_mm_;
+  SectionPrior prior_;
+  BorderedSystem system_;
+  std::vector<Viewer> viewers_;
+  std::vector<Row> rows_;
+  std::vector<NodeVector> nodes_;
+  std::vector<NodeMatrix> own_, with_next_;
+  std::vector<Vector6d> place_sum_;
+  Eigen::VectorXd camera_solution_;
+  double noise_scale_ = 1.0;
+  double correlation_ = 1.0;
+};
+
+}  // namespace
+
+AxisCurve JointEstimate::axis() const {
+  AxisCurve curve;
+  curve.x_step_mm = step_mm;
+  for (const NodeVector& node : nodes) {
+    curve.yz_mm.emplace_back(node(kY), node(kZ));
+    curve.slope.emplace_back(node(kYSlope), node(kZSlope));
+  }
+  return curve;
+}
+
+std::optional<JointEstimate> estimate_jointly(std::span<const ObservedForging> observations,
+                                              std::vector<Placement> placements, const AxisCurve& start,
+                                              std::span<const double> start_radius_mm, double shift_sigma_mm,
+                                              const CombineConfig& config) {
+  return JointSolver(observations, std::move(placements), start, start_radius_mm, shift_sigma_mm, config).run();
+}
+
+}  // namespace imprint

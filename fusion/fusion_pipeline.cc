@@ -1,0 +1,75 @@
+#include "fusion/fusion_pipeline.h"
+
+#include <utility>
+
+#include "fusion/combine/combine_config.h"
+#include "fusion/triangulate/triangulate_config.h"
+
+namespace imprint {
+namespace {
+
+/// Cameras of an observation that could not be triangulated, with why.
+std::vector<CameraShare> shares_of_failed(const Observation& observation, const std::string& reason) {
+  std::vector<CameraShare> shares;
+  for (const Imprint& imprint : observation.imprints) {
+    CameraShare share;
+    share.id = imprint.camera_id;
+    share.pose = imprint.pose;
+    share.reprojection_rms_px = imprint.quality.reprojection_rms_px;
+    share.targets_used = imprint.quality.targets_used;
+    share.edge_points = imprint.quality.edge_points;
+    share.excluded = true;
+    share.reason = imprint.failure.empty() ? reason : imprint.failure;
+    shares.push_back(std::move(share));
+  }
+  return shares;
+}
+
+}  // namespace
+
+Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
+                         std::string method) {
+  if (observations.empty()) return job_failed("session {}: no observation", session);
+  std::vector<ObservedForging> observed;
+  std::vector<double> rotations_deg;
+  std::vector<Measurement::Observation> reports;
+  std::vector<std::string> warnings;
+  std::string first_failure;
+  for (const Observation& observation : observations) {
+    Measurement::Observation report{.index = observation.index, .rotation_deg = observation.rotation_deg, .cameras = {}};
+    auto triangulated = triangulate(observation.imprints, forging, TriangulateConfig{});
+    if (triangulated) {
+      report.cameras = triangulated->cameras;
+      for (const std::string& warning : triangulated->warnings)
+        warnings.push_back(fmt::format("observation {}: {}", observation.index, warning));
+    } else {
+      report.cameras = shares_of_failed(observation, triangulated.error().message);
+      const std::string failure = fmt::format("observation {}: {}", observation.index, triangulated.error().message);
+      if (first_failure.empty()) first_failure = failure;
+      warnings.push_back(failure + "; the observation is left out");
+    }
+    for (const auto& [id, why] : observation.missing) {
+      CameraShare share;
+      share.id = id;
+      share.excluded = true;
+      share.reason = why;
+      report.cameras.push_back(std::move(share));
+      warnings.push_back(fmt::format("observation {}: camera {} left out: {}", observation.index, id, why));
+    }
+    reports.push_back(std::move(report));
+    if (!triangulated) continue;
+    observed.push_back(std::move(*triangulated));
+    rotations_deg.push_back(observation.rotation_deg);
+  }
+  if (observed.empty()) {
+    std::string missing;
+    for (const auto& [id, why] : observations.front().missing) missing += fmt::format("; {}: {}", id, why);
+    return job_failed("session {}: {}{}", session, first_failure, missing);
+  }
+  auto combined = combine(observed, rotations_deg, forging, CombineConfig{});
+  if (!combined) return job_failed("session {}: {}", session, combined.error().message);
+  combined->warnings.insert(combined->warnings.begin(), warnings.begin(), warnings.end());
+  return make_measurement(*combined, std::move(reports), std::move(session), std::move(method));
+}
+
+}  // namespace imprint
