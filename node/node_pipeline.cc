@@ -78,9 +78,10 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
   note_resection(*resection, imprint);
   result.resection = std::move(*resection);
 
-  const auto segmentation = timed(result, "segment", [&] {
+  const auto segmentation = timed(result, "segment", [&]() -> Result<Segmentation> {
     const auto prior = make_segment_prior(camera, imprint.pose, rig.forging, rig.field);
-    return segment_forging(frame.image, prior, SegmentConfig{});
+    if (!prior) return pass_on(prior.error());
+    return segment_forging(frame.image, *prior, SegmentConfig{});
   });
   if (!segmentation) {
     return give_up(result, {segmentation.error().kind, fmt::format("{}: camera \"{}\": {}", frame.source, camera.id,

@@ -62,7 +62,7 @@ Result<Frame> read_image(const std::filesystem::path& path, std::vector<std::str
     image = red_channel(image);
     if (warnings != nullptr) warnings->push_back(fmt::format("{}: a colour image, reduced to its red channel", source));
   }
-  return Frame{image, source, 0, 0};
+  return Frame{image, source, 0, 0, {}};
 }
 
 }  // namespace imprint
