@@ -51,7 +51,7 @@ Result<void> run(const ProgramOptions& options) {
   }
   const auto method = edge_method_from_name(config->method);
   if (!method) return pass_on(method.error());
-  const auto source = open_frame_source(*config);
+  const auto source = open_frame_source(config->capture_source, config->capture_path, config->camera_id);
   if (!source) return pass_on(source.error());
   if (options.check) {
     std::cout << options.config.string() << ": OK\n";

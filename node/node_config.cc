@@ -1,8 +1,7 @@
 #include "node/node_config.h"
 
 #include "lib/daemon/program.h"
-#include "node/capture/file_source.h"
-#include "node/capture/simulation_source.h"
+#include "node/capture/frame_source.h"
 
 namespace imprint {
 
@@ -17,7 +16,7 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
   config.rig = read.path("node.rig");
   config.method = read_choice(read, "node.method", kMethods, config.method);
   config.log_level = read_choice(read, "node.log_level", kLogLevels, config.log_level);
-  config.capture_source = read_choice(read, "capture.source", {"folder", "session", "simulation"}, std::nullopt);
+  config.capture_source = read_choice(read, "capture.source", kFrameSources, std::nullopt);
   config.capture_path = read.path("capture.path");
   config.zenoh = read_zenoh_section(read, config.zenoh);
   config.health_period_s = read.number("health.period_s", config.health_period_s);
@@ -39,12 +38,6 @@ std::string to_toml(const NodeConfig& config) {
       toml_text(config.method), toml_text(config.log_level), toml_text(config.capture_source),
       toml_text(config.capture_path.string()), toml_list(config.zenoh.connect), toml_list(config.zenoh.listen),
       toml_number(config.health_period_s));
-}
-
-Result<std::unique_ptr<FrameSource>> open_frame_source(const NodeConfig& config) {
-  if (config.capture_source == "folder") return open_folder_source(config.capture_path, config.camera_id);
-  if (config.capture_source == "session") return open_session_source(config.capture_path, config.camera_id);
-  return open_simulation_source(config.capture_path, config.camera_id);
 }
 
 }  // namespace imprint

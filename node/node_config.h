@@ -1,13 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "lib/config/toml_file.h"
 #include "lib/result/result.h"
 #include "lib/transport/transport.h"
-#include "node/capture/frame_source.h"
 
 namespace imprint {
 
@@ -30,8 +28,5 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
 
 /// The effective config in the file's own form.
 std::string to_toml(const NodeConfig& config);
-
-/// The frame source that the config names.
-Result<std::unique_ptr<FrameSource>> open_frame_source(const NodeConfig& config);
 
 }  // namespace imprint

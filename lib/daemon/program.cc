@@ -72,7 +72,7 @@ ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults) {
   return config;
 }
 
-std::string read_choice(TomlReader& read, std::string_view key, std::initializer_list<std::string_view> choices,
+std::string read_choice(TomlReader& read, std::string_view key, std::span<const std::string_view> choices,
                         std::optional<std::string> fallback) {
   std::string value = read.string(key, std::move(fallback));
   if (!read.error() && std::ranges::find(choices, value) == choices.end()) {

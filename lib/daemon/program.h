@@ -1,9 +1,10 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
-#include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,12 +40,12 @@ std::string read_id(TomlReader& read, std::string_view key, std::optional<std::s
 ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults);
 
 /// One of a few words.
-std::string read_choice(TomlReader& read, std::string_view key, std::initializer_list<std::string_view> choices,
+std::string read_choice(TomlReader& read, std::string_view key, std::span<const std::string_view> choices,
                         std::optional<std::string> fallback);
 /// The edge methods of contract section 3, and the levels of lib/log.
-inline constexpr std::initializer_list<std::string_view> kMethods = {"best",    "orientation", "magnitude", "combined",
-                                                                    "uniform", "none",        "pixel"};
-inline constexpr std::initializer_list<std::string_view> kLogLevels = {"trace", "debug", "info", "warning", "error", "off"};
+inline constexpr auto kMethods = std::to_array<std::string_view>(
+    {"best", "orientation", "magnitude", "combined", "uniform", "none", "pixel"});
+inline constexpr auto kLogLevels = std::to_array<std::string_view>({"trace", "debug", "info", "warning", "error", "off"});
 
 /// A TOML string, number or list for --print-config.
 std::string toml_text(std::string_view text);

@@ -29,6 +29,9 @@ class Keys {
   [[nodiscard]] std::string service(std::string_view camera_id = kAny, std::string_view name = kAny) const;
   [[nodiscard]] std::string trigger() const;
   [[nodiscard]] std::string result(std::string_view session = kAny) const;
+  /// `name`: status or result, answered by the fusion node.
+  [[nodiscard]] std::string fusion_service(std::string_view name) const;
+  [[nodiscard]] std::string fusion_alive() const;
   [[nodiscard]] std::string everything() const;  ///< all of the line
 
   /// The camera's id in a key of this line such as `.../cam/<id>/imprint`; none when it is no camera's key.

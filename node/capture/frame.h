@@ -14,7 +14,7 @@ struct Frame {
   std::string source;  ///< file or device, for messages
   std::int64_t sensor_time_ns = 0;
   std::uint64_t sequence = 0;
-  std::vector<std::string> warnings;  ///< what the capture noticed, for the imprint
+  std::vector<std::string> warnings{};  ///< what the capture noticed, for the imprint
 };
 
 }  // namespace imprint

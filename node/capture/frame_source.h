@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "lib/result/result.h"
 #include "node/capture/frame.h"
@@ -22,5 +25,11 @@ class FrameSource {
   /// One frame, taken now. Fails (job_failed or invalid_input) naming the device or the file; may be called again.
   virtual Result<Frame> capture(const CaptureRequest& request) = 0;
 };
+
+inline constexpr auto kFrameSources = std::to_array<std::string_view>({"folder", "session", "simulation"});
+
+/// Opens one of `kFrameSources`; `path` is the folder of pictures, the session.toml or the scene file.
+Result<std::unique_ptr<FrameSource>> open_frame_source(std::string_view source, const std::filesystem::path& path,
+                                                       const std::string& camera_id);
 
 }  // namespace imprint

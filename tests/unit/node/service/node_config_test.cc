@@ -1,0 +1,71 @@
+#include "node/node_config.h"
+
+#include <catch2/catch.hpp>
+
+#include "tests/unit/temporary_folder.h"
+
+namespace imprint {
+namespace {
+
+constexpr const char* kSmallest = R"(
+[node]
+camera_id = "cam1"
+rig = "rig.toml"
+[capture]
+source = "folder"
+path = "images"
+)";
+
+Result<NodeConfig> read(const TemporaryFolder& folder, const std::string& text, const std::string& override_text = "") {
+  const auto path = folder.write("node.toml", text);
+  auto table = parse_toml_file(path);
+  REQUIRE(table);
+  if (!override_text.empty()) REQUIRE(apply_override(*table, override_text));
+  return read_node_config(path, *table);
+}
+
+std::string fault(const std::string& text, const std::string& override_text = "") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, text, override_text);
+  REQUIRE_FALSE(config);
+  REQUIRE(config.error().exit_status() == 2);
+  return config.error().message;
+}
+
+}  // namespace
+
+TEST_CASE("node config: four keys are enough and paths are relative to the file") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, kSmallest);
+  REQUIRE(config);
+  REQUIRE(config->site == "plant");
+  REQUIRE(config->line == "L1");
+  REQUIRE(config->rig == folder / "rig.toml");
+  REQUIRE(config->zenoh.connect == std::vector<std::string>{"tcp/127.0.0.1:7447"});
+  REQUIRE_FALSE(config->zenoh.router);
+}
+
+TEST_CASE("node config: what is printed reads back as the same config") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, std::string(kSmallest) + "[health]\nperiod_s = 2\n", "capture.path=a \"b\"");
+  REQUIRE(config);
+  const auto again = read(folder, to_toml(*config));
+  REQUIRE(again);
+  REQUIRE(to_toml(*again) == to_toml(*config));
+  REQUIRE(again->health_period_s == 2.0);
+}
+
+TEST_CASE("node config: a fault names the file, the line and the key") {
+  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiod_s = -1\n").find("node.toml:9: health.period_s: ") != std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiods = 1\n").find("node.toml:9: health.periods: unknown key") != std::string::npos);
+  REQUIRE(fault("[node]\nrig = \"r\"\n").find("node.camera_id: missing") != std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[zenoh]\nconnect = [\"localhost\"]\n").find("zenoh.connect") != std::string::npos);
+}
+
+TEST_CASE("node config: a fault of an override says that it is the command line's") {
+  REQUIRE(fault(kSmallest, "node.method=sharpest").find("node.method: expected one of best") != std::string::npos);
+  REQUIRE(fault(kSmallest, "health.period_s=0").find("--set: health.period_s") != std::string::npos);
+  REQUIRE(fault(kSmallest, "node.site=../x").find("node.site") != std::string::npos);
+}
+
+}  // namespace imprint

@@ -1,0 +1,223 @@
+#include "node/node_service.h"
+
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+namespace imprint {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A camera that gives the pictures it is told to.
+class FakeSource final : public FrameSource {
+ public:
+  Result<Frame> capture(const CaptureRequest& request) override {
+    ++captures;
+    if (request.observation == failing_observation) return job_failed("the lens cap is on");
+    Frame frame;
+    frame.sensor_time_ns = 42;
+    frame.warnings = {"one channel of three"};
+    return frame;
+  }
+  int failing_observation = -1;
+  std::atomic<int> captures = 0;
+};
+
+// A node, and someone who listens, on one bus.
+struct Line {
+  std::shared_ptr<MemoryBus> bus = make_memory_bus();
+  std::unique_ptr<Transport> node_side = open_memory(bus);
+  std::unique_ptr<Transport> fusion_side = open_memory(bus);
+  Keys keys = *Keys::of("plant", "L1");
+  FakeSource source;
+  std::mutex mutex;
+  std::vector<Imprint> imprints;
+  std::vector<Health> healths;
+  std::vector<std::unique_ptr<Declaration>> declarations;
+  std::unique_ptr<Publisher> triggers = *fusion_side->publish(keys.trigger(), {.traffic = Traffic::command});
+
+  Line() {
+    declarations.push_back(*fusion_side->subscribe(keys.imprint(), {}, [this](const Sample& sample) {
+      const std::lock_guard lock(mutex);
+      imprints.push_back(*decode_imprint(sample.payload));
+    }));
+    declarations.push_back(*fusion_side->subscribe(keys.health(), {}, [this](const Sample& sample) {
+      const std::lock_guard lock(mutex);
+      healths.push_back(*decode_health(sample.payload));
+    }));
+  }
+
+  void fire(std::uint32_t observation, std::int64_t fire_at_ns = 0) {
+    REQUIRE(triggers->put(encode_trigger({"S", observation, 30.0 * observation, fire_at_ns, 3})));
+  }
+
+  std::vector<Imprint> wait_for_imprints(std::size_t count) {
+    for (int i = 0; i < 500; ++i) {
+      {
+        const std::lock_guard lock(mutex);
+        if (imprints.size() >= count) return imprints;
+      }
+      std::this_thread::sleep_for(10ms);
+    }
+    const std::lock_guard lock(mutex);
+    return imprints;
+  }
+};
+
+NodeConfig config() {
+  NodeConfig config;
+  config.camera_id = "cam1";
+  config.method = "uniform";
+  return config;
+}
+
+ProcessedFrame seen(const Frame& /*frame*/) {
+  ProcessedFrame processed;
+  processed.imprint.quality.targets_seen = 17;
+  for (ImprintCurve* curve : {&processed.imprint.upper, &processed.imprint.lower, &processed.imprint.axis}) {
+    curve->offset_px.assign(kImprintStations, 1.0);
+    curve->weight.assign(kImprintStations, 1.0);
+  }
+  processed.imprint.focal_length_px = 5000.0;
+  return processed;
+}
+
+}  // namespace
+
+TEST_CASE("node: a trigger is answered by an imprint that carries what the trigger said") {
+  Line line;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  line.fire(2);
+  const auto imprints = line.wait_for_imprints(1);
+  REQUIRE(imprints.size() == 1);
+  REQUIRE(imprints[0].camera_id == "cam1");
+  REQUIRE(imprints[0].session == "S");
+  REQUIRE(imprints[0].observation == 2);
+  REQUIRE(imprints[0].rotation_deg == 60.0);
+  REQUIRE(imprints[0].sensor_time_ns == 42);
+  REQUIRE(imprints[0].method == "uniform");
+  REQUIRE(imprints[0].sequence == 1);
+  REQUIRE(imprints[0].boot_id != 0);
+  REQUIRE(imprints[0].warnings == std::vector<std::string>{"one channel of three"});
+  REQUIRE(imprints[0].upper.offset_px.size() == kImprintStations);
+}
+
+TEST_CASE("node: a trigger that was answered well is not answered again, one that failed is") {
+  Line line;
+  line.source.failing_observation = 1;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  line.fire(0);
+  line.fire(0);
+  line.fire(1);
+  REQUIRE(line.wait_for_imprints(2).size() == 2);
+  line.source.failing_observation = -1;
+  line.fire(0);
+  line.fire(1);
+  const auto imprints = line.wait_for_imprints(3);
+  REQUIRE(imprints.size() == 3);
+  REQUIRE(imprints[1].observation == 1);
+  REQUIRE(imprints[1].failure == "the lens cap is on");
+  REQUIRE(imprints[2].observation == 1);
+  REQUIRE(imprints[2].failure.empty());
+  REQUIRE(imprints[2].sequence == 3);
+  REQUIRE(line.source.captures == 3);
+}
+
+TEST_CASE("node: an exception of a stage fails the frame, not the node") {
+  Line line;
+  bool first = true;
+  NodeService node(
+      config(), line.source,
+      [&](const Frame& frame) {
+        if (std::exchange(first, false)) throw std::runtime_error("out of memory");
+        return seen(frame);
+      },
+      *line.node_side);
+  REQUIRE(node.start());
+  line.fire(0);
+  line.fire(1);
+  const auto imprints = line.wait_for_imprints(2);
+  REQUIRE(imprints.size() == 2);
+  REQUIRE(imprints[0].failure.find("out of memory") != std::string::npos);
+  REQUIRE(imprints[1].failure.empty());
+}
+
+TEST_CASE("node: health is sent on start and after every frame, with the last error in at most 80 characters") {
+  Line line;
+  line.source.failing_observation = 1;
+  NodeService node(
+      config(), line.source,
+      [](const Frame& frame) {
+        auto processed = seen(frame);
+        processed.imprint.failure = std::string(79, 'x') + "\xC3\xA4tail";  // the cut falls inside a character
+        return processed;
+      },
+      *line.node_side);
+  REQUIRE(node.start());
+  line.fire(0);
+  REQUIRE(line.wait_for_imprints(1).size() == 1);
+  node.stop();
+  const std::lock_guard lock(line.mutex);
+  REQUIRE(line.healths.size() >= 2);
+  REQUIRE(line.healths.front().frames == 0);
+  REQUIRE(line.healths.back().frames == 1);
+  REQUIRE(line.healths.back().failed_frames == 1);
+  REQUIRE(line.healths.back().targets_seen == 17);
+  REQUIRE(line.healths.back().sequence == 1);
+  REQUIRE(line.healths.back().last_error == std::string(79, 'x'));
+}
+
+TEST_CASE("node: a trigger fires at its moment; one of clocks that disagree fires at once with a warning") {
+  Line line;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto begin = std::chrono::steady_clock::now();
+  line.fire(0, std::chrono::duration_cast<std::chrono::nanoseconds>(now + 300ms).count());
+  REQUIRE(line.wait_for_imprints(1).size() == 1);
+  REQUIRE(std::chrono::steady_clock::now() - begin > 250ms);  // 300 ms less what passed since `now`
+  line.fire(1, std::chrono::duration_cast<std::chrono::nanoseconds>(now + 1h).count());
+  const auto imprints = line.wait_for_imprints(2);
+  REQUIRE(imprints.size() == 2);
+  REQUIRE(imprints[1].warnings.back().find("check the clocks") != std::string::npos);
+}
+
+TEST_CASE("node: it stops at once while it waits for a trigger's moment, and malformed triggers change nothing") {
+  Line line;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  REQUIRE(line.triggers->put(Bytes{0xFF, 0xFF, 0xFF}));
+  REQUIRE(line.triggers->put(Bytes(1'000'000, 0)));
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  line.fire(0, std::chrono::duration_cast<std::chrono::nanoseconds>(now + 30s).count());
+  std::this_thread::sleep_for(50ms);
+  const auto begin = std::chrono::steady_clock::now();
+  node.stop();
+  REQUIRE(std::chrono::steady_clock::now() - begin < 2s);
+  REQUIRE(line.source.captures == 0);
+}
+
+TEST_CASE("node: its token is there while it runs and gone when it has stopped") {
+  Line line;
+  std::mutex mutex;
+  std::vector<std::pair<std::string, bool>> changes;
+  auto watch = line.fusion_side->watch_liveness(line.keys.alive(), [&](std::string_view key, bool alive) {
+    const std::lock_guard lock(mutex);
+    changes.emplace_back(key, alive);
+  });
+  REQUIRE(watch);
+  {
+    NodeService node(config(), line.source, seen, *line.node_side);
+    REQUIRE(node.start());
+  }
+  std::this_thread::sleep_for(100ms);
+  const std::lock_guard lock(mutex);
+  REQUIRE(changes == std::vector<std::pair<std::string, bool>>{{line.keys.alive("cam1"), true}, {line.keys.alive("cam1"), false}});
+}
+
+}  // namespace imprint
