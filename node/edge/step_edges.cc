@@ -13,7 +13,7 @@ struct Window {
   int from = 0, count = 0;
 };
 Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur) {
-  const int reach = std::clamp(static_cast<int>(std::ceil(2.5 * blur + 1.5)), 3, 12);
+  const int reach = std::clamp(static_cast<int>(std::ceil(3.5 * blur + 2.5)), 4, 12);
   const int middle = static_cast<int>(std::lround(traced.edge.position_px - line.first_px));
   const int from = std::max({0, middle - reach, std::min(traced.edge.from_sample, middle - 2)});
   const int to = std::min({line.count - 1, middle + reach, std::max(traced.edge.to_sample, middle + 2)});
@@ -82,13 +82,15 @@ std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<Tr
 }
 
 std::vector<StepEdge> zero_crossing_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced) {
-  const int lag = std::max(1, static_cast<int>(std::lround(0.5 / scan.spacing_px)));
+  constexpr double kHalfWidthPx =
+      1.5;  // the slope of the second derivative is about straight over this, for blurs from 0.5 px
+  const int arm = std::max(1, static_cast<int>(std::lround(1 / scan.spacing_px)));
   std::vector<StepEdge> edges;
   for (const TracedEdge& t : traced) {
     const ScanLine& line = scan.lines[t.line];
     const float* values = scan.samples(line);
     const double start = (t.edge.position_px - line.first_px) / scan.spacing_px;
-    const auto crossing = zero_crossing(values, line.count, start, lag);
+    const auto crossing = zero_crossing(values, line.count, start, arm, kHalfWidthPx / scan.spacing_px);
     if (!crossing) continue;
     const int reach = static_cast<int>(std::lround(3 / scan.spacing_px)), middle = static_cast<int>(std::lround(start));
     const double step = values[std::min(line.count - 1, middle + reach)] - values[std::max(0, middle - reach)];

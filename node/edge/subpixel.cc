@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -57,36 +56,25 @@ std::optional<StepFit> fit_step(const float* values, int count, double start, do
   return fit;
 }
 
-std::optional<double> zero_crossing(const float* values, int count, double start, int lag) {
-  const int n = count - 4 * lag;
-  if (n < 5) return std::nullopt;
-  std::vector<double> second(static_cast<std::size_t>(n));  // second[i] stands at sample i + 2 lag
-  for (int i = 0; i < n; ++i)
-    second[static_cast<std::size_t>(i)] = values[i + 4 * lag] - 2.0 * values[i + 2 * lag] + values[i];
-  const int middle = std::clamp(static_cast<int>(std::lround(start)) - 2 * lag, 1, n - 2);
-  // From the peak of the first derivative out to the two extremes of the second.
-  int a = middle, b = middle;
-  const auto at = [&](int i) { return second[static_cast<std::size_t>(i)]; };
-  while (a > 0 && at(a - 1) > at(a)) --a;
-  while (b + 1 < n && at(b + 1) < at(b)) ++b;
-  const double high = at(a), low = at(b);
-  if (!(high > 0 && low < 0) || b - a < 1) return std::nullopt;
-  // The middle of the slope is about straight: leave out the rounded tops.
-  double sw = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (int i = a; i <= b; ++i) {
-    if (at(i) > 0.75 * high || at(i) < 0.75 * low) continue;
-    sw += 1, sx += i, sy += at(i), sxx += static_cast<double>(i) * i, sxy += i * at(i);
+std::optional<double> zero_crossing(const float* values, int count, double start, int arm, double half_width) {
+  const int first = 2 * arm, last = count - 1 - 2 * arm;
+  double at = start;
+  for (int pass = 0; pass < 3; ++pass) {  // the stretch of the line moves with the crossing
+    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    const int from = std::max(first, static_cast<int>(std::ceil(at - half_width)));
+    const int to = std::min(last, static_cast<int>(std::floor(at + half_width)));
+    for (int i = from; i <= to; ++i) {
+      const double x = i - at, second = values[i + 2 * arm] - 2.0 * values[i] + values[i - 2 * arm];
+      n += 1, sx += x, sy += second, sxx += x * x, sxy += x * second;
+    }
+    const double det = n * sxx - sx * sx;
+    if (n < 3 || !(det > 0)) return std::nullopt;
+    const double slope = (n * sxy - sx * sy) / det;
+    if (!(slope < 0)) return std::nullopt;  // from the rise's foot to its head the second derivative falls
+    at += (sx - sy / slope) / n;
+    if (!(std::abs(at - start) < 2 * half_width)) return std::nullopt;
   }
-  double crossing = 0.0;
-  const double det = sw * sxx - sx * sx;
-  if (sw >= 2 && det > 1e-9 && sw * sxy - sx * sy < 0) {
-    const double slope = (sw * sxy - sx * sy) / det;
-    crossing = (sx - sy / slope) / sw;
-  } else {
-    crossing = a + (b - a) * high / (high - low);
-  }
-  if (!(crossing >= a && crossing <= b)) return std::nullopt;
-  return crossing + 2 * lag;
+  return at;
 }
 
 }  // namespace imprint

@@ -18,9 +18,9 @@ struct StepFit {
 /// noise. `blur` is fitted too when `free_blur`, else kept. Nothing when it does not settle near `start`.
 std::optional<StepFit> fit_step(const float* values, int count, double start, double blur, bool free_blur);
 
-/// The position, in samples, at which the second central derivative of `values` passes zero near `start`, from a line
-/// fitted to its slope between its two extremes ([C] 2.3.2 and [38] there). `lag`: samples in a central difference's
-/// arm.
-std::optional<double> zero_crossing(const float* values, int count, double start, int lag);
+/// The position, in samples, at which the second derivative of a rising step near `start` passes zero: the zero of a
+/// line fitted to it over +-`half_width` samples, where it is about straight ([C] 2.3.2 and [38] there). The derivative
+/// is the central difference of the central difference, each with arms of `arm` samples.
+std::optional<double> zero_crossing(const float* values, int count, double start, int arm, double half_width);
 
 }  // namespace imprint
