@@ -59,7 +59,9 @@ class MemoryQuery final : public Query {
         declared_(std::move(declared)),
         parameters_(std::move(parameters)),
         payload_(std::move(payload)) {}
-  ~MemoryQuery() override { pending_->close_one(); }
+  ~MemoryQuery() override {
+    if (!answered_) pending_->close_one();
+  }
   MemoryQuery(const MemoryQuery&) = delete;
   MemoryQuery& operator=(const MemoryQuery&) = delete;
 
@@ -85,6 +87,7 @@ class MemoryQuery final : public Query {
     if (answered_) return job_failed("query on '{}': expected one answer, found a second", key_);
     answered_ = true;
     send();
+    pending_->close_one();
     return {};
   }
 

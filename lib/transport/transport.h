@@ -26,7 +26,8 @@ using SampleCallback = std::function<void(const Sample&)>;
 using MissCallback = std::function<void(std::string_view source, std::uint32_t count)>;
 using LivenessCallback = std::function<void(std::string_view key, bool alive)>;
 
-/// A request that waits for its answer; may be answered later and from any thread, at most once.
+/// A request that waits for its answer; may be answered later and from any thread, at most once. Dropped
+/// unanswered, the asking side gets nothing from here.
 class Query {
  public:
   virtual ~Query() = default;
@@ -77,12 +78,16 @@ class Transport {
 };
 
 struct ZenohConfig {
-  std::vector<std::string> connect;  ///< endpoints to reach, e.g. "tcp/10.0.0.5:7447"; kept trying for ever
-  std::vector<std::string> listen;   ///< endpoints to open; none by default
-  bool router = false;               ///< route for others (the fusion node)
+  std::vector<std::string> connect{};  ///< endpoints to reach, e.g. "tcp/10.0.0.5:7447"; kept trying for ever
+  std::vector<std::string> listen{};   ///< endpoints to open; none by default
+  bool router = false;                 ///< route for others (the fusion node)
+  bool tool = false;                   ///< a command for a person: needs a router there, and says so when there is none
 };
 
-/// Opens at once and connects when the other side is there.
+/// Opens at once and connects when the other side is there, now or later; a tool instead fails (job_failed)
+/// when no router is reached within 3 s. A router carries between itself, nodes and tools, but not from one
+/// node (neither router nor tool) to another: Zenoh takes those to be connected directly.
+/// Fails naming the endpoint: invalid_input for one that is malformed, job_failed for one that cannot be opened.
 Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config);
 
 /// The twin for tests: every transport opened on one bus sees the others, in this process.

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
+#include <optional>
+#include <regex>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -14,14 +16,10 @@
 namespace imprint {
 namespace {
 
-/// What Zenoh says of a failure, without the place in its source where it said so.
+/// What Zenoh says of a failure, without the places in its source where it said so.
 std::string reason_of(const std::exception& error) {
-  std::string reason = error.what();
-  if (const auto at = reason.find(" at /"); at != std::string::npos) {
-    const auto end = reason.find(".rs:", at);
-    if (end != std::string::npos) reason.erase(at, reason.find_first_of(". ", end + 4) - at);
-  }
-  return reason;
+  static const std::regex place(R"( at \S+\.rs:\d+\.?)");
+  return std::regex_replace(error.what(), place, "");
 }
 
 rust::Slice<const std::uint8_t> slice(std::span<const std::uint8_t> bytes) { return {bytes.data(), bytes.size()}; }
@@ -94,38 +92,41 @@ class LivenessForwarder final : public bridge::LivenessHandler {
 
 class ZenohQuery final : public Query {
  public:
-  explicit ZenohQuery(rust::Box<bridge::Request> request) : request_(std::move(request)) {}
-
-  std::string key() const override { return std::string(request_->key()); }
-  std::string parameters() const override { return std::string(request_->parameters()); }
-  Bytes payload() const override {
-    const auto bytes = request_->payload();
-    return {bytes.begin(), bytes.end()};
+  explicit ZenohQuery(rust::Box<bridge::Request> request)
+      : key_(request->key()), parameters_(request->parameters()), request_(std::move(request)) {
+    const auto payload = (*request_)->payload();
+    payload_.assign(payload.begin(), payload.end());
   }
+
+  std::string key() const override { return key_; }
+  std::string parameters() const override { return parameters_; }
+  Bytes payload() const override { return payload_; }
   Result<void> reply(std::span<const std::uint8_t> payload) override {
-    return answer([&] { request_->reply(slice(payload)); });
+    return answer([&] { (*request_)->reply(slice(payload)); });
   }
   Result<void> reply_error(std::string_view message) override {
-    return answer([&] { request_->reply_error(str(message)); });
+    return answer([&] { (*request_)->reply_error(str(message)); });
   }
 
  private:
   template <class Send>
   Result<void> answer(Send&& send) {
     const std::lock_guard lock(mutex_);
-    if (answered_) return job_failed("query on '{}': expected one answer, found a second", key());
+    if (!request_) return job_failed("query on '{}': expected one answer, found a second", key_);
     try {
       send();
     } catch (const rust::Error& error) {
-      return job_failed("query on '{}': cannot be answered: {}", key(), reason_of(error));
+      return job_failed("query on '{}': cannot be answered: {}", key_, reason_of(error));
     }
-    answered_ = true;
+    request_.reset();  // tells the asking side that nothing more will come
     return {};
   }
 
-  rust::Box<bridge::Request> request_;
+  std::string key_;
+  std::string parameters_;
+  Bytes payload_;
   std::mutex mutex_;
-  bool answered_ = false;
+  std::optional<rust::Box<bridge::Request>> request_;
 };
 
 class RequestForwarder final : public bridge::RequestHandler {
@@ -264,11 +265,14 @@ Result<void> check_endpoint(std::string_view side, const std::string& endpoint) 
   return {};
 }
 
-Result<void> check_endpoints(const ZenohConfig& config) {
+Result<void> check_config(const ZenohConfig& config) {
   for (const auto& endpoint : config.connect)
     if (auto checked = check_endpoint("connect", endpoint); !checked) return checked;
   for (const auto& endpoint : config.listen)
     if (auto checked = check_endpoint("listen", endpoint); !checked) return checked;
+  if (config.tool && (config.router || config.connect.empty()))
+    return invalid_input("Zenoh session of a tool: expected an endpoint to connect to, and no router, found {}",
+                         config.router ? "a router" : "no endpoint");
   return {};
 }
 
@@ -278,32 +282,48 @@ std::string joined(const std::vector<std::string>& endpoints) {
   return text;
 }
 
+/// How long a full link may hold up an imprint before it is dropped: bursts pass, a camera hardly waits.
+constexpr int kWaitBeforeDropUs = 20000;
+/// How long a node waits for its connection before it goes on without: spares it losing its first messages.
+constexpr int kConnectDelayMs = 500;
+/// How long a tool tries to reach a router.
+constexpr int kToolTimeoutMs = 3000;
+
+const char* mode_of(const ZenohConfig& config) {
+  if (config.router) return "router";
+  return config.tool ? "client" : "peer";
+}
+
 /// The session's configuration as Zenoh reads it. Peer and router mode open at once and go on trying to
-/// connect; client mode would wait for its router. No multicast: only the endpoints named are ever spoken to.
+/// connect; client mode waits for its router. No multicast: only the endpoints named are ever spoken to.
+/// No time stamps: messages carry their own sensor time.
 std::string session_config(const ZenohConfig& config) {
-  const nlohmann::json json = {
-      {"mode", config.router ? "router" : "peer"},
-      {"connect",
-       {{"endpoints", config.connect},
-        {"timeout_ms", -1},
-        {"exit_on_failure", false},
-        {"retry", {{"period_init_ms", 200}, {"period_max_ms", 2000}, {"period_increase_factor", 2}}}}},
-      {"listen", {{"endpoints", config.listen}, {"timeout_ms", 0}, {"exit_on_failure", true}}},
-      {"scouting", {{"multicast", {{"enabled", false}}}}},
-      {"timestamping", {{"enabled", false}}},  // messages carry their own sensor time
-  };
+  nlohmann::json json;
+  json["mode"] = mode_of(config);
+  json["connect"]["endpoints"] = config.connect;
+  json["connect"]["timeout_ms"] = config.tool ? kToolTimeoutMs : -1;
+  json["connect"]["exit_on_failure"] = config.tool;
+  json["connect"]["retry"] = {{"period_init_ms", 200}, {"period_max_ms", 2000}, {"period_increase_factor", 2}};
+  json["listen"] = {{"endpoints", config.listen}, {"timeout_ms", 0}, {"exit_on_failure", true}};
+  json["scouting"]["multicast"]["enabled"] = false;
+  json["scouting"]["delay"] = config.router ? 0 : kConnectDelayMs;
+  json["timestamping"]["enabled"] = false;
+  json["transport"]["link"]["tx"]["queue"]["congestion_control"]["drop"]["wait_before_drop"] = kWaitBeforeDropUs;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
 
 Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config) {
-  if (auto checked = check_endpoints(config); !checked) return pass_on(checked.error());
+  if (auto checked = check_config(config); !checked) return pass_on(checked.error());
   try {
     static std::once_flag log_once;
     std::call_once(log_once, [] { bridge::log_to_stderr("error"); });
     return std::make_unique<ZenohTransport>(bridge::open_session(session_config(config)));
   } catch (const rust::Error& error) {
+    if (config.tool)
+      return job_failed("connect endpoint {}: no router reached within {} s: is imprint-fusion running there?",
+                        joined(config.connect), kToolTimeoutMs / 1000);
     return job_failed("Zenoh session (connect [{}], listen [{}]): cannot be opened: {}", joined(config.connect),
                       joined(config.listen), reason_of(error));
   }

@@ -1,7 +1,7 @@
 //! Zenoh as lib/transport needs it, for C++ through `cxx`: sessions, publishers and subscribers with
 //! history, liveliness, queries. Every failure is a `Result` here and a `rust::Error` there.
 
-use std::time::Duration;
+use std::{io::IsTerminal, time::Duration};
 
 use cxx::SharedPtr;
 use zenoh::{
@@ -128,6 +128,10 @@ pub struct Request {
 }
 
 fn log_to_stderr(level: &str) {
+    // In a journal the colours would be noise.
+    if !std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
+        std::env::set_var("NO_COLOR", "1");
+    }
     zenoh::init_log_from_env_or(level);
 }
 
