@@ -4,8 +4,8 @@
 
 namespace imprint {
 
-/// Sixty 15-bit codes for scenes that name no library: any two differ in at least 3 bits in every rotation and each
-/// has at least 6 changes of bit round the ring, as the library of [A] 2.2.
+/// Sixty 15-bit codes for scenes that name no library: any two differ in at least 4 bits in every rotation and each
+/// has at least 6 changes of bit round the ring.
 TargetLibrary scene_library();
 
 }  // namespace imprint

@@ -27,6 +27,7 @@ class PlateFace {
     inner_ = dot_ * geometry.ring_inner_radius / geometry.dot_radius;
     outer_ = dot_ * geometry.ring_outer_radius / geometry.dot_radius;
     white_ = scene.targets.white_level * plate.brightness;
+    unevenness_ = 0.06 * std::min(1.0, scene.corruption);
     seed_ = stream_seed(scene.seed, "dirt", static_cast<std::uint64_t>(plate.code.id));
   }
 
@@ -62,7 +63,7 @@ class PlateFace {
   // Smooth enough to be looked up once a pixel.
   [[nodiscard]] double soil(const Eigen::Vector2d& p, double printed) const {
     const Eigen::Vector3d at(p.x() / dot_, p.y() / dot_, 0.0);
-    const double shade = printed * (1.0 + 0.06 * value_noise(seed_, 0.5 * at));
+    const double shade = printed * (1.0 + unevenness_ * value_noise(seed_, 0.5 * at));
     if (plate_.state != PlateState::dirty) return shade;
     const double blot = std::clamp(4.0 * (fractal_noise(seed_ + 100, 0.9 * at, 4, 0.55) - 0.08), 0.0, 1.0);
     return shade + 0.75 * blot * (0.3 * white_ - shade);
@@ -82,6 +83,7 @@ class PlateFace {
   const Plate& plate_;
   int bits_;
   double dot_, half_, inner_ = 0.0, outer_ = 0.0, white_ = 0.0;
+  double unevenness_ = 0.0;
   std::uint64_t seed_ = 0;
 };
 
