@@ -3,6 +3,7 @@
 #include <bit>
 #include <set>
 
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 
 #include "simulation/code_set.h"

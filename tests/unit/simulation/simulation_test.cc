@@ -5,13 +5,17 @@
 #include <map>
 #include <mutex>
 
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "lib/camera/camera_pose.h"
 #include "lib/config/atomic_file.h"
 #include "lib/rig/rig.h"
+#include "simulation/layout.h"
 #include "simulation/scene.h"
+#include "simulation/truth.h"
 #include "tests/unit/temporary_folder.h"
 
 namespace imprint {
@@ -32,11 +36,13 @@ std::map<std::string, std::string> files_of(const std::filesystem::path& folder)
   return files;
 }
 
-Eigen::Vector3d vector_of(const nlohmann::json& json) { return {json[0], json[1], json[2]}; }
+Eigen::Vector3d vector_of(const nlohmann::json& json) {
+  return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
+}
 
 Eigen::Matrix3d matrix_of(const nlohmann::json& json) {
   Eigen::Matrix3d m;
-  for (int i = 0; i < 9; ++i) m(i / 3, i % 3) = json[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 9; ++i) m(i / 3, i % 3) = json[static_cast<std::size_t>(i)].get<double>();
   return m;
 }
 
@@ -112,13 +118,21 @@ TEST_CASE("simulation: what it writes is a session that reads back, and a truth 
 }
 
 TEST_CASE("simulation: the manipulator errs within its limits and the truth says how") {
-  const TemporaryFolder folder;
   const Scene scene = quick_scene();
-  REQUIRE(write_simulation(scene, folder.path(), {}, 2));
-  const auto truth = nlohmann::json::parse(read_file(folder / "truth.json").value());
+  const auto layout = lay_out(scene);
+  REQUIRE(layout);
+  const auto text = truth_json(scene, *layout);
+  REQUIRE(text);
+  const auto truth = nlohmann::json::parse(*text);
   for (const auto& observation : truth.at("observations")) {
-    CHECK(vector_of(observation.at("shift_mm")).cwiseAbs().maxCoeff() <= scene.observations.position_error_mm);
-    CHECK(vector_of(observation.at("shift_mm")).norm() > 0.0);
+    const Eigen::Vector3d shift_mm = vector_of(observation.at("shift_mm"));
+    CHECK(shift_mm.cwiseAbs().maxCoeff() <= scene.observations.position_error_mm);
+    CHECK(shift_mm.norm() > 0.0);
+    // The middle of the ideal axis lies off its place by the shift.
+    const Eigen::Vector3d middle =
+        vector_of(observation.at("origin_world_mm")) +
+        matrix_of(observation.at("R_forging_world")).row(0).transpose() * 0.5 * truth.at("length_mm").get<double>();
+    CHECK((middle - scene.forging.center_world_mm - shift_mm).norm() < 1e-9);
     const double error =
         observation.at("true_rotation_deg").get<double>() - observation.at("rotation_deg").get<double>();
     CHECK(std::abs(error) <= scene.observations.rotation_error_deg);
