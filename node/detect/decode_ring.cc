@@ -6,12 +6,15 @@
 #include <limits>
 #include <numbers>
 
+#include <Eigen/Cholesky>
+
 #include "lib/targets/code_distance.h"
 
 namespace imprint {
 namespace {
 
-constexpr double reading_sigma = 0.12;      // unevenness of paint and light over a target, ours
+constexpr double black_sigma = 0.06;        // unevenness of the ground, in units of the dot's contrast, ours
+constexpr double white_sigma = 0.12;        // unevenness of paint and light, in shares of a white bit's reading, ours
 constexpr double cover_probability = 0.05;  // that a bit shows something else, ours
 constexpr double cover_density = 0.4;       // of a reading that may be anything from -0.5 to 2
 constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
@@ -21,10 +24,6 @@ int bit_of(std::uint32_t code, int bits, int index) {
   return static_cast<int>((code >> ((2 * bits - 1 - index) % bits)) & 1U);
 }
 
-double predicted(const BitResponse& response, int before, int own, int after) {
-  return response.floor + response.own * own + response.beside * (before + after);
-}
-
 double log_likelihood(double reading, double expected, double sigma) {
   if (std::isnan(reading)) return std::log(cover_probability * cover_density);
   const double z = (reading - expected) / sigma;
@@ -32,14 +31,16 @@ double log_likelihood(double reading, double expected, double sigma) {
   return std::log((1.0 - cover_probability) * normal + cover_probability * cover_density);
 }
 
-double sigma_of(const RingScan& scan) { return std::hypot(reading_sigma, scan.noise); }
+double log_likelihood(const RingScan& scan, std::size_t bit, int before, int own, int after) {
+  const double expected = scan.response[bit].reading(before, own, after);
+  return log_likelihood(scan.reading[bit], expected, std::hypot(black_sigma, white_sigma * expected, scan.noise));
+}
 
 /// Log likelihood of stretches of a code, so that a whole code costs few look-ups: each stretch of five bits depends
 /// on those and their two neighbours.
 class StretchTables {
  public:
   StretchTables(const RingScan& scan, int bits) : bits_(bits) {
-    const double sigma = sigma_of(scan);
     for (int first = 0; first < bits; first += stretch) {
       const int length = std::min(stretch, bits - first);
       std::vector<double> table(std::size_t{1} << (length + 2));
@@ -47,8 +48,7 @@ class StretchTables {
         for (int i = 0; i < length; ++i) {
           const auto bit = [&](int k) { return static_cast<int>((pattern >> (length + 1 - k)) & 1U); };
           const auto at = static_cast<std::size_t>(first + i);
-          table[pattern] +=
-              log_likelihood(scan.reading[at], predicted(scan.response[at], bit(i), bit(i + 1), bit(i + 2)), sigma);
+          table[pattern] += log_likelihood(scan, at, bit(i), bit(i + 1), bit(i + 2));
         }
       }
       tables_.push_back(std::move(table));
@@ -76,6 +76,29 @@ class StretchTables {
   std::vector<std::vector<double>> tables_;
 };
 
+/// Light level and slope by least squares of the logarithm of the white bits' readings, drawn towards even light; false
+/// when too few bits are white.
+bool fit_light(RingScan& scan, std::uint32_t code, int bits) {
+  Eigen::Matrix3d normal = Eigen::Vector3d(0.1, 0.3, 0.3).asDiagonal();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  int white = 0;
+  for (int i = 0; i < bits; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double even = scan.response[at].own +
+                        scan.response[at].beside * (bit_of(code, bits, i + bits - 1) + bit_of(code, bits, i + 1));
+    const double ratio = (scan.reading[at] - scan.response[at].floor) / even;
+    if (bit_of(code, bits, i) == 0 || !(ratio > 0.1)) continue;
+    const Eigen::Vector3d row(1.0, scan.place[at].x(), scan.place[at].y());
+    normal += row * row.transpose();
+    right += std::log(ratio) * row;
+    ++white;
+  }
+  if (white < 2) return false;
+  const Eigen::Vector3d fitted = normal.ldlt().solve(right);
+  set_light(scan, fitted.tail<2>(), std::exp(fitted[0]));
+  return true;
+}
+
 }  // namespace
 
 RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
@@ -90,9 +113,8 @@ RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
     most_white_ = std::max(most_white_, std::popcount(code.code));
   }
   const int correctable = (min_distance_ - 1) / 2;
-  const int hidden = static_cast<int>(max_unknown_ * bits_);
-  least_white_ = std::max(0, least_white_ - std::max(correctable, hidden));
-  most_white_ = std::min(bits_, most_white_ + std::max(correctable, hidden));
+  least_white_ = std::max(0, least_white_ - correctable);
+  most_white_ = std::min(bits_, most_white_ + correctable);
 }
 
 struct RingDecoder::Match {
@@ -101,7 +123,16 @@ struct RingDecoder::Match {
   std::uint32_t code = 0;
 };
 
-DecodedRing RingDecoder::decode(const RingScan& scan) const {
+DecodedRing RingDecoder::decode(RingScan& scan) const {
+  DecodedRing ring = decode_once(scan);
+  for (int round = 0; round < 2 && !ring.accepted; ++round) {
+    if (!fit_light(scan, ring.code, bits_)) break;
+    ring = decode_once(scan);
+  }
+  return ring;
+}
+
+DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   const StretchTables tables(scan, bits_);
   Match best;
   Match second;
@@ -125,7 +156,8 @@ DecodedRing RingDecoder::decode(const RingScan& scan) const {
   }
   DecodedRing ring;
   ring.id = best.id;
-  const double sigma = sigma_of(scan);
+  ring.code = best.code;
+  const double sigma = std::hypot(black_sigma, white_sigma, scan.noise);
   const double one_wrong_bit = log_likelihood(0.0, 0.0, sigma) - log_likelihood(1.0, 0.0, sigma);
   ring.margin = codes_.size() < 2 ? bits_ : (best.log_likelihood - second.log_likelihood) / one_wrong_bit;
   compare_bits(scan, best.code, ring);
@@ -142,11 +174,12 @@ void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, Decoded
     const int before = bit_of(code, bits_, i + bits_ - 1);
     const int own = bit_of(code, bits_, i);
     const int after = bit_of(code, bits_, i + 1);
-    const double limit = known_limit * std::max(response.own, 0.2) + 2.0 * scan.noise;
-    const double off = std::abs(scan.reading[at] - predicted(response, before, own, after));
-    const double other = std::abs(scan.reading[at] - predicted(response, before, 1 - own, after));
+    const double contrast = std::max(response.light * response.own, 0.1);
+    const double limit = known_limit * contrast + 2.0 * scan.noise;
+    const double off = std::abs(scan.reading[at] - response.reading(before, own, after));
+    const double other = std::abs(scan.reading[at] - response.reading(before, 1 - own, after));
     if (off <= limit) {
-      sum += off * off;
+      sum += off * off / (contrast * contrast);
       ++known;
     } else if (other <= limit) {
       ++ring.wrong;

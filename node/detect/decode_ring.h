@@ -14,7 +14,8 @@ struct DecodedRing {
   int unknown = 0;        ///< bits that show neither colour (a cover, dirt, outside the image)
   double distance = 0.0;  ///< wrong + unknown / 2, as [A] equation 14 counts
   double margin = 0.0;    ///< log likelihood above the best other id, in units of one wrong bit
-  double fit = 0.0;       ///< rms difference between the readings of known bits and the code's
+  double fit = 0.0;  ///< rms difference between the readings of known bits and the code's, in shares of their light
+  std::uint32_t code = 0;  ///< the code at its rotation: bit (bits - 1) is the scan's first
   bool accepted = false;
 };
 
@@ -25,10 +26,11 @@ class RingDecoder {
  public:
   RingDecoder(const TargetLibrary& library, double max_unknown);
 
-  /// The most likely code. It is accepted when the wrong and unknown bits can be corrected for sure
+  /// The most likely code, for the light as the dot's shading has it, or, when that is not accepted, for the light that
+  /// fits the white bits of a first decoding. It is accepted when the wrong and unknown bits can be corrected for sure
   /// (2 wrong + unknown < distance of the library), or when nothing but unknown bits is amiss and the other codes are
   /// ruled out by two bits or more; and when the known bits fit well.
-  [[nodiscard]] DecodedRing decode(const RingScan& scan) const;
+  [[nodiscard]] DecodedRing decode(RingScan& scan) const;
 
   /// Fewest and most white bits of a ring that could be accepted.
   [[nodiscard]] int least_white() const { return least_white_; }
@@ -37,6 +39,7 @@ class RingDecoder {
 
  private:
   struct Match;
+  [[nodiscard]] DecodedRing decode_once(const RingScan& scan) const;
   [[nodiscard]] bool accepts(const DecodedRing& ring) const;
   void compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const;
 

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
+#include "lib/targets/code_distance.h"
 #include "node/detect/decode_ring.h"
 #include "node/detect/detect_config.h"
 #include "node/detect/detection_trace.h"
@@ -22,6 +25,55 @@ int levels_for(double max_dot_px) {
   return levels;
 }
 
+double diameter_of(const Ellipse& ellipse) {
+  const EllipseAxes axes = axes_of(ellipse);
+  return axes.semi_major_px + axes.semi_minor_px;
+}
+
+/// A centre less sure than this share of the dot's diameter is no dot's: texture that happens to look like one.
+constexpr double max_sigma_of_diameter = 0.04;
+
+/// Spots of a texture stand beside each other like a small dot and a ring of few arcs: from a dot of few px only a
+/// ring with many changes of colour, all of them right, is taken for a code.
+bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
+  constexpr double small_px = 5.0;
+  constexpr double medium_px = 8.0;
+  const int transitions = bit_transitions(ring.code, bits);
+  if (minor_axis_px < small_px) return transitions >= 6 && ring.distance == 0.0;
+  if (minor_axis_px < medium_px) return transitions >= 4;
+  return true;
+}
+
+/// Ellipses already looked at: one dot is found from several maxima, on two levels.
+class ExaminedPlaces {
+ public:
+  [[nodiscard]] bool has_like(const Ellipse& ellipse) const {
+    const double diameter = diameter_of(ellipse);
+    const auto [x, y] = cell_of(ellipse.center);
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto cell = cells_.find({x + dx, y + dy});
+        if (cell == cells_.end()) continue;
+        for (const Ellipse& known : cell->second) {
+          constexpr double near = 0.2;      // radii
+          constexpr double similar = 0.15;  // share of the diameter
+          if (known.radius_of(ellipse.center) < near && std::abs(diameter_of(known) - diameter) < similar * diameter)
+            return true;
+        }
+      }
+    }
+    return false;
+  }
+  void add(const Ellipse& ellipse) { cells_[cell_of(ellipse.center)].push_back(ellipse); }
+
+ private:
+  static std::pair<int, int> cell_of(const Eigen::Vector2d& p) {
+    constexpr double cell_px = 32.0;
+    return {static_cast<int>(std::floor(p.x() / cell_px)), static_cast<int>(std::floor(p.y() / cell_px))};
+  }
+  std::map<std::pair<int, int>, std::vector<Ellipse>> cells_;
+};
+
 /// A target with what decides between two that claim the same id or place.
 struct Found {
   DetectedTarget target;
@@ -40,65 +92,108 @@ class TargetSearch {
         trace_(trace) {}
 
   std::vector<DetectedTarget> run() {
-    // Large dots first: fewer candidates, and the parts of their rings are then known.
-    for (int l = pyramid_.levels() - 1; l >= 0; --l) search_level(l);
+    for (int l = 0; l < pyramid_.levels(); ++l) collect_candidates(l);
+    // The best ellipses first, so that the parts of a target's ring are known when their turn comes.
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.doubt < b.doubt; });
+    for (const Candidate& candidate : candidates_) {
+      if (is_known(candidate.full) || examined_.has_like(candidate.full)) continue;
+      examined_.add(candidate.full);
+      const Rejection rejection = examine(candidate.level, candidate.star);
+      if (rejection != Rejection::none) reject(candidate.full, rejection);
+    }
     return each_id_once();
   }
 
  private:
-  void search_level(int l) {
+  struct Candidate {
+    int level = 0;
+    StarEllipse star;  // px of the level
+    Ellipse full;      // px of the image
+    double doubt = 0.0;
+  };
+
+  /// Ellipses of one level that stand on dark ground and have something like a ring.
+  void collect_candidates(int l) {
     const GreyImage& level = pyramid_.level(l);
+    // A blurred or shaded ring shows fewer white places than it has: half of the fewest is asked for.
+    const double least_white_ring = 0.5 * decoder_.least_white() / library_.bits;
     for (const cv::Point& blob : find_blobs(level.mat(), config_.min_contrast, config_.max_candidates_per_tile)) {
       const auto star = find_star_ellipse(level, {blob.x, blob.y}, config_);
       if (!star) continue;
-      StarEllipse full = *star;
-      full.ellipse = star->ellipse.scaled(ImagePyramid::scale(l), ImagePyramid::from_level(star->ellipse.center, l));
-      const EllipseAxes axes = axes_of(full.ellipse);
-      const double diameter = axes.semi_major_px + axes.semi_minor_px;
+      const Ellipse full =
+          star->ellipse.scaled(ImagePyramid::scale(l), ImagePyramid::from_level(star->ellipse.center, l));
+      const double diameter = diameter_of(full);
       if (diameter < 0.8 * config_.min_dot_px || diameter > 1.25 * config_.max_dot_px) continue;
-      if (is_known(full.ellipse)) continue;
-      if (const Rejection rejection = examine(level, star->ellipse, full);
-          rejection != Rejection::none && trace_ != nullptr) {
-        trace_->rejected.push_back({full.ellipse, rejection});
+      const RingGlance glance = glance_at_ring(level, star->ellipse, star->white, star->black, library_.geometry);
+      constexpr double least_dark_valley = 0.75;
+      if (glance.dark_valley < least_dark_valley) {
+        reject(full, Rejection::no_dark_ground);
+      } else if (glance.white_ring < least_white_ring) {
+        reject(full, Rejection::no_ring);
+      } else {
+        candidates_.push_back({l, *star, full, star->residual + (1.0 - glance.dark_valley)});
       }
     }
   }
 
-  /// From a rough ellipse to a decoded target, the cheapest doubt first.
-  Rejection examine(const GreyImage& level, const Ellipse& on_level, const StarEllipse& star) {
-    const RingGlance glance = glance_at_ring(level, on_level, star.white, star.black, library_.geometry);
-    if (glance.dark_valley < 0.75) return Rejection::no_dark_ground;
-    // A blurred or shaded ring shows fewer white places than it has: half of the fewest is asked for.
-    if (glance.white_ring < 0.5 * decoder_.least_white() / library_.bits) return Rejection::no_ring;
-    const auto dot = fit_dot(pyramid_.level(0), star.ellipse, star.white, star.black);
-    if (!dot || dot->contrast < config_.min_contrast) return Rejection::poor_ellipse;
-    const EllipseAxes axes = axes_of(dot->ellipse);
-    const double diameter = axes.semi_major_px + axes.semi_minor_px;
+  void reject(const Ellipse& ellipse, Rejection reason) {
+    if (trace_ != nullptr) trace_->rejected.push_back({ellipse, reason});
+  }
+
+  /// From a rough ellipse to a decoded target, the cheapest doubt first: the fit at full resolution, which takes the
+  /// longest, is left to what has a code already.
+  Rejection examine(int l, const StarEllipse& star) {
+    const GreyImage& level = pyramid_.level(l);
+    const auto rough = fit_dot(level, {star.ellipse, star.black, star.white - star.black});
+    if (!rough || rough->contrast < config_.min_contrast) return Rejection::poor_ellipse;
+    if (const Rejection rejection = decode(from_level(*rough, l), nullptr); rejection != Rejection::none)
+      return rejection;
+    if (l == 0) return decode(*rough, &found_);
+    const FittedDot guess = from_level(*rough, l);
+    const double pixel_width = 1.0 / 12.0;
+    const double blur = std::sqrt(std::max(
+        pixel_width, guess.blur_px * guess.blur_px - pixel_width * ImagePyramid::scale(l) * ImagePyramid::scale(l)));
+    const auto fine = fit_dot(pyramid_.level(0), {guess.ellipse, guess.black, guess.contrast, blur});
+    return fine ? decode(*fine, &found_) : Rejection::poor_ellipse;
+  }
+
+  /// Decodes the ring of a dot and notes the target in `found` where it is accepted and `found` is given.
+  Rejection decode(const FittedDot& dot, std::vector<Found>* found) {
+    const double diameter = diameter_of(dot.ellipse);
     if (diameter < config_.min_dot_px || diameter > config_.max_dot_px) return Rejection::size;
+    const EllipseAxes axes = axes_of(dot.ellipse);
     if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return Rejection::poor_ellipse;
-    const auto scan = scan_ring(pyramid_, *dot, library_.bits, library_.geometry, config_.max_unknown);
+    if (dot.sigma_px > max_sigma_of_diameter * diameter) return Rejection::poor_ellipse;
+    auto scan = scan_ring(pyramid_, dot, library_.bits, library_.geometry, config_.max_unknown);
     if (!scan) return Rejection::outside;
     const DecodedRing ring = decoder_.decode(*scan);
-    if (trace_ != nullptr) trace_->decoded.push_back({dot->ellipse, *scan, ring});
-    if (!ring.accepted) return Rejection::no_code;
-    Found found;
-    found.target = {
-        ring.id, {dot->ellipse.center.x(), dot->ellipse.center.y()}, dot->sigma_px, diameter, ring.distance};
-    found.ellipse = dot->ellipse;
-    found.margin = ring.margin;
-    found.fit = ring.fit;
-    found_.push_back(found);
+    if (trace_ != nullptr) trace_->decoded.push_back({dot.ellipse, *scan, ring});
+    if (!ring.accepted || !is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits)) return Rejection::no_code;
+    if (found != nullptr) {
+      const DetectedTarget target{
+          ring.id, {dot.ellipse.center.x(), dot.ellipse.center.y()}, dot.sigma_px, diameter, ring.distance};
+      found->push_back({target, dot.ellipse, ring.margin, ring.fit});
+    }
     return Rejection::none;
   }
 
+  /// Whether the place belongs to a target that is found: its dot or its ring.
   [[nodiscard]] bool is_known(const Ellipse& ellipse) const {
+    const double outer = library_.geometry.ring_outer_radius / library_.geometry.dot_radius;
     return std::any_of(found_.begin(), found_.end(),
-                       [&](const Found& f) { return f.ellipse.radius_of(ellipse.center) < 0.7; });
+                       [&](const Found& f) { return f.ellipse.radius_of(ellipse.center) < outer; });
+  }
+
+  static bool is_clearly_better(const Found& a, const Found& b) {
+    constexpr double larger = 2.0;  // what texture feigns is small
+    return a.target.distance + 0.5 <= b.target.distance ||
+           a.target.dot_diameter_px >= larger * b.target.dot_diameter_px;
   }
 
   static bool is_better(const Found& a, const Found& b) {
     if (a.target.distance != b.target.distance) return a.target.distance < b.target.distance;
-    return a.fit < b.fit;
+    return a.fit / a.target.dot_diameter_px < b.fit / b.target.dot_diameter_px;
   }
 
   /// Of two targets that claim one id the one with fewer bits amiss stays; when neither is better, both go: a wrong id
@@ -112,7 +207,7 @@ class TargetSearch {
       const auto next =
           std::find_if(first, found_.end(), [&](const Found& f) { return f.target.id != first->target.id; });
       const bool alone = next - first == 1;
-      const bool clear = alone || first->target.distance + 0.5 <= (first + 1)->target.distance;
+      const bool clear = alone || is_clearly_better(*first, *(first + 1));
       if (clear) targets.push_back(first->target);
       if (trace_ != nullptr) {
         for (auto f = clear ? first + 1 : first; f != next; ++f)
@@ -124,6 +219,8 @@ class TargetSearch {
   }
 
   ImagePyramid pyramid_;
+  std::vector<Candidate> candidates_;
+  ExaminedPlaces examined_;
   const TargetLibrary& library_;
   RingDecoder decoder_;
   const DetectConfig& config_;

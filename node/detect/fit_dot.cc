@@ -15,9 +15,10 @@ constexpr int parameters = 10;  // centre 2, shape 3, log blur, black, contrast,
 using Vector = Eigen::Matrix<double, parameters, 1>;
 using Matrix = Eigen::Matrix<double, parameters, parameters>;
 
-constexpr double min_blur_px = 0.25;     // below the 0.29 px of a pixel's own width
-constexpr double window_radii = 1.5;     // half-way between the dot and a ring that begins at 2
-constexpr double residual_scale = 0.12;  // share of the contrast beyond which a grey value is not the dot's
+constexpr double min_blur_px = 0.25;      // below the 0.29 px of a pixel's own width
+constexpr double min_window_radii = 1.5;  // half-way between the dot and a ring that begins at 2
+constexpr double max_window_radii = 1.9;  // in dots of few px, to have ground enough
+constexpr double residual_scale = 0.12;   // share of the contrast beyond which a grey value is not the dot's
 
 struct Sample {
   Eigen::Vector2d p;  // from the guessed centre
@@ -61,10 +62,11 @@ class DotModel {
     const Eigen::Vector2d radius_gradient = dot_.shape * q / radius;
     const double slope = std::max(radius_gradient.norm(), 1e-9);
     const double z = -(radius - 1.0) / (slope * dot_.blur);  // first order in the distance to the ellipse
-    const double cover = 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0);
+    constexpr double far = 4.5;                              // blurs from the edge: flat to 3e-6 of the contrast
+    const double cover = z > far ? 1.0 : z < -far ? 0.0 : 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0);
     const double shade = 1.0 + dot_.shading.dot(q);
     if (gradient != nullptr) {
-      const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+      const double density = std::abs(z) > far ? 0.0 : std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
       const double by_z = dot_.contrast * shade * density;
       const double by_radius = -by_z / (slope * dot_.blur);
       Vector& g = *gradient;
@@ -88,6 +90,8 @@ class DotModel {
 /// Grey values in the window; in large dots only every second or third row and column of what is far from the edge,
 /// with the weight of those left out.
 std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
+  const double semi_minor = axes_of(guess).semi_minor_px;
+  const double window_radii = std::clamp(1.0 + 1.5 / semi_minor, min_window_radii, max_window_radii);
   const Eigen::Matrix2d covariance = guess.shape.inverse();
   const double half_width = window_radii * std::sqrt(covariance(0, 0));
   const double half_height = window_radii * std::sqrt(covariance(1, 1));
@@ -95,7 +99,6 @@ std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
   const int right = std::min(image.width() - 1, static_cast<int>(std::floor(guess.center.x() + half_width)));
   const int top = std::max(0, static_cast<int>(std::ceil(guess.center.y() - half_height)));
   const int bottom = std::min(image.height() - 1, static_cast<int>(std::floor(guess.center.y() + half_height)));
-  const double semi_minor = axes_of(guess).semi_minor_px;
   const int stride = semi_minor > 40.0 ? 4 : semi_minor > 16.0 ? 2 : 1;
   const double edge_band = std::max(0.2, 5.0 / semi_minor);
   std::vector<Sample> samples;
@@ -128,18 +131,16 @@ NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& 
     const double residual = sample.grey - model.at(sample.p, &gradient);
     const double ratio = residual * residual / (scale * scale);
     const double weight = sample.weight / ((1.0 + ratio) * (1.0 + ratio));
-    equations.matrix.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
-    equations.right += weight * residual * gradient;
+    equations.matrix.noalias() += (weight * gradient) * gradient.transpose();
+    equations.right += (weight * residual) * gradient;
     equations.cost += sample.weight * residual * residual / (1.0 + ratio);
     equations.weight += weight;
   }
-  equations.matrix.triangularView<Eigen::StrictlyUpper>() = equations.matrix.transpose();
   return equations;
 }
 
-/// Levenberg-Marquardt from `dot`; false when it does not come to rest.
-bool adjust(const std::vector<Sample>& samples, double scale, Dot& dot, NormalEquations& equations) {
-  constexpr int max_steps = 20;
+/// Levenberg-Marquardt from `dot`; false when it leads nowhere.
+bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Dot& dot, NormalEquations& equations) {
   double damping = 1e-3;
   equations = normal_equations(samples, dot, scale);
   for (int i = 0; i < max_steps; ++i) {
@@ -161,24 +162,36 @@ bool adjust(const std::vector<Sample>& samples, double scale, Dot& dot, NormalEq
       damping *= 8.0;
     }
     const double moved_px = step.head<2>().norm();
-    if (moved_px < 1e-5 || (!better && damping > 1e6)) return true;
+    if ((better && moved_px < 3e-4) || (!better && damping > 1e4)) return true;
   }
   return true;
 }
 
 }  // namespace
 
-std::optional<FittedDot> fit_dot(const GreyImage& image, const Ellipse& guess, double white, double black) {
+FittedDot from_level(const FittedDot& dot, int level) {
+  const double scale = ImagePyramid::scale(level);
+  FittedDot full = dot;
+  full.ellipse = dot.ellipse.scaled(scale, ImagePyramid::from_level(dot.ellipse.center, level));
+  full.blur_px *= scale;
+  full.sigma_px *= scale;
+  full.shading /= scale;
+  full.noise *= scale;  // a pixel of the level is the mean of scale^2 pixels
+  return full;
+}
+
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start) {
+  const Ellipse& guess = start.ellipse;
   const std::vector<Sample> samples = samples_of(image, guess);
-  if (samples.size() < 2 * parameters) return std::nullopt;
-  Dot dot{Eigen::Vector2d::Zero(), guess.shape, 0.8, black, white - black, Eigen::Vector2d::Zero()};
+  if (samples.size() < parameters + 4) return std::nullopt;
+  Dot dot{Eigen::Vector2d::Zero(), guess.shape, start.blur_px, start.black, start.contrast, Eigen::Vector2d::Zero()};
   NormalEquations equations;
   // Twice: with a wide scale, then with the noise known.
-  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, dot, equations) || !(dot.contrast > 0.0))
+  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, 4, dot, equations) || !(dot.contrast > 0.0))
     return std::nullopt;
   double noise = std::sqrt(equations.cost / std::max(1.0, equations.weight));
   const double scale = std::max(residual_scale * dot.contrast, 5.0 * noise);
-  if (!adjust(samples, scale, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
+  if (!adjust(samples, scale, 10, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
 
   FittedDot fitted;
   fitted.ellipse = {guess.center + dot.center, dot.shape};
@@ -197,6 +210,8 @@ std::optional<FittedDot> fit_dot(const GreyImage& image, const Ellipse& guess, d
   fitted.noise = noise;
   fitted.sigma_px = std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
   if (!std::isfinite(fitted.sigma_px)) return std::nullopt;
+  constexpr double significant = 4.0;  // standard deviations: the ring magnifies a wrong shading
+  if (dot.shading.norm() > significant * std::sqrt(covariance(8, 8) + covariance(9, 9))) fitted.shading = dot.shading;
   return fitted;
 }
 

@@ -15,6 +15,16 @@ struct FittedDot {
   double contrast = 0.0;  ///< white minus black at the centre
   double noise = 0.0;     ///< standard deviation of a grey value about the model
   double sigma_px = 0.0;  ///< standard deviation of each coordinate of the centre
+  Eigen::Vector2d shading =
+      Eigen::Vector2d::Zero();  ///< relative change of the light per px; zero where not significant
+};
+
+/// What a fit begins with.
+struct DotGuess {
+  Ellipse ellipse;
+  double black = 0.0;
+  double contrast = 0.0;
+  double blur_px = 0.8;
 };
 
 /// The dot near `guess` (in px of `image`) by least squares of all grey values within 1.5 radii against a blurred
@@ -22,6 +32,9 @@ struct FittedDot {
 /// grey levels and shading are fitted together, pixels that do not fit (dirt, a cover) weigh less. The centre of a
 /// symmetric dot has no bias whatever the blur's shape is, and its standard deviation comes from the normal equations.
 /// Nothing when it does not converge near the guess. In place of the edge points of [A] 2.3.4.
-std::optional<FittedDot> fit_dot(const GreyImage& image, const Ellipse& guess, double white, double black);
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& guess);
+
+/// The same dot in the px of level 0, from px of `level`.
+FittedDot from_level(const FittedDot& dot, int level);
 
 }  // namespace imprint

@@ -134,9 +134,11 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
   for (int bit = 0; bit < bits; ++bit) {
     const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
     scan.reading.push_back(read_bit(columns, begin).mean);
-    scan.response.push_back(
-        response_at(dot, bits, geometry, two_pi * (static_cast<double>(begin) + 0.5 * columns_per_bit) / count));
+    const double angle = two_pi * (static_cast<double>(begin) + 0.5 * columns_per_bit) / count;
+    scan.place.push_back(row_radius(geometry, rows / 2) * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    scan.response.push_back(response_at(dot, bits, geometry, angle));
   }
+  set_light(scan, light_slope(dot), 1.0);
   // Pixels that one reading averages: the scanned part of a bit's area, at least one.
   const EllipseAxes axes = axes_of(dot.ellipse);
   const double inner = row_radius(geometry, 0);
@@ -145,6 +147,15 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
       std::numbers::pi * axes.semi_major_px * axes.semi_minor_px * (outer * outer - inner * inner) / bits * 0.67;
   scan.noise = dot.noise / dot.contrast / std::sqrt(std::max(1.0, area));
   return scan;
+}
+
+Eigen::Vector2d light_slope(const FittedDot& dot) { return frame_of(dot.ellipse) * dot.shading; }
+
+void set_light(RingScan& scan, const Eigen::Vector2d& slope, double level) {
+  constexpr double most = 5.0;
+  for (std::size_t i = 0; i < scan.response.size(); ++i) {
+    scan.response[i].light = std::clamp(level * std::exp(slope.dot(scan.place[i])), 1.0 / most, most);
+  }
 }
 
 RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black,

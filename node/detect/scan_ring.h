@@ -9,20 +9,26 @@
 
 namespace imprint {
 
-/// How a blurred image of a ring shows at one bit: reading = floor + own bit * own + (its neighbours') * beside.
-/// Without blur floor = 0, own = 1, beside = 0.
+/// How a blurred, unevenly lit ring shows at one bit: reading = floor + light (own bit * own + its neighbours' *
+/// beside). Without blur floor = 0, own = 1, beside = 0; where the light is even, light = 1.
 struct BitResponse {
   double floor = 0.0;  ///< light of the dot that reaches the ring
   double own = 1.0;
-  double beside = 0.0;  ///< light of each of the two next bits
+  double beside = 0.0;  ///< share of each of the two next bits
+  double light = 1.0;   ///< light at the bit in units of that at the dot's centre
+
+  [[nodiscard]] double reading(int before, int bit, int after) const {
+    return floor + light * (own * bit + beside * (before + after));
+  }
 };
 
 /// What is read off a code ring, one value a bit, clockwise as seen from an arbitrary bit.
 struct RingScan {
   std::vector<double> reading;  ///< 0: as black as the ground of the dot; 1: as white as the dot; NaN: outside
   std::vector<BitResponse> response;
-  double noise = 0.0;      ///< standard deviation of a reading from the noise of the image
-  double deviation = 0.0;  ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
+  std::vector<Eigen::Vector2d> place;  ///< middle of each bit in the frame of the dot, where that is the unit circle
+  double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
+  double deviation = 0.0;              ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
 };
 
 /// Scans the ring of a dot densely (24 columns a bit, 5 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
@@ -31,6 +37,12 @@ struct RingScan {
 /// Nothing when more than `max_unknown` of the ring lies outside the image.
 std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
                                   const TargetGeometry& geometry, double max_unknown);
+
+/// The light's slope in the frame of the dot (logarithm per dot radius), as the shading over the dot tells it.
+Eigen::Vector2d light_slope(const FittedDot& dot);
+
+/// Takes the light to change by exp(slope . place) over the ring, within a factor of five.
+void set_light(RingScan& scan, const Eigen::Vector2d& slope, double level);
 
 /// Quick look at a dot found on one level: the share of places round it that are dark in the valley between dot and
 /// ring, and the share that are white on the ring.
