@@ -18,7 +18,9 @@ constexpr double white_sigma = 0.12;        // unevenness of paint and light, in
 constexpr double cover_probability = 0.05;  // that a bit shows something else, ours
 constexpr double cover_density = 0.4;       // of a reading that may be anything from -0.5 to 2
 constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
-constexpr double max_fit = 0.22;            // rms of the known bits; rings in clutter have levels at random
+constexpr double max_profile =
+    0.15;                         // rms of the columns; spots of a texture have no edges where a code has them, ours
+constexpr double max_fit = 0.22;  // rms of the known bits; rings in clutter have levels at random
 
 int bit_of(std::uint32_t code, int bits, int index) {
   return static_cast<int>((code >> ((2 * bits - 1 - index) % bits)) & 1U);
@@ -125,9 +127,15 @@ struct RingDecoder::Match {
 
 DecodedRing RingDecoder::decode(RingScan& scan) const {
   DecodedRing ring = decode_once(scan);
-  for (int round = 0; round < 2 && !ring.accepted; ++round) {
-    if (!fit_light(scan, ring.code, bits_)) break;
-    ring = decode_once(scan);
+  constexpr int rounds = 2;
+  constexpr double even_enough = 0.05;
+  for (int round = 0; round < rounds && (!ring.accepted || ring.profile > even_enough); ++round) {
+    RingScan relit = scan;
+    if (!fit_light(relit, ring.code, bits_)) break;
+    const DecodedRing next = decode_once(relit);
+    if (!(next.profile < ring.profile)) break;
+    ring = next;
+    scan = std::move(relit);
   }
   return ring;
 }
@@ -161,6 +169,7 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   const double one_wrong_bit = log_likelihood(0.0, 0.0, sigma) - log_likelihood(1.0, 0.0, sigma);
   ring.margin = codes_.size() < 2 ? bits_ : (best.log_likelihood - second.log_likelihood) / one_wrong_bit;
   compare_bits(scan, best.code, ring);
+  compare_profile(scan, ring);
   ring.accepted = accepts(ring);
   return ring;
 }
@@ -179,7 +188,7 @@ void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, Decoded
     const double off = std::abs(scan.reading[at] - response.reading(before, own, after));
     const double other = std::abs(scan.reading[at] - response.reading(before, 1 - own, after));
     if (off <= limit) {
-      sum += off * off / (contrast * contrast);
+      sum += off * off / std::max(0.25, contrast * contrast);
       ++known;
     } else if (other <= limit) {
       ++ring.wrong;
@@ -191,8 +200,30 @@ void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, Decoded
   ring.fit = known > 0 ? std::sqrt(sum / known) : 1.0;
 }
 
+/// Columns that are off by more than `known_limit` count as if they were off by that: they belong to dirt or a cover.
+void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const {
+  double sum = 0.0;
+  int count = 0;
+  for (int i = 0; i < bits_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const int before = bit_of(ring.code, bits_, i + bits_ - 1);
+    const int own = bit_of(ring.code, bits_, i);
+    const int after = bit_of(ring.code, bits_, i + 1);
+    for (int k = 0; k < columns_per_bit; ++k) {
+      const double column = scan.columns[at * columns_per_bit + static_cast<std::size_t>(k)];
+      if (std::isnan(column)) continue;
+      const double offset = (k + 0.5) / columns_per_bit - 0.5;
+      const double off = std::min(0.5, std::abs(column - scan.response[at].column_reading(offset, before, own, after)));
+      sum += off * off;
+      ++count;
+    }
+  }
+  const double column_noise = scan.noise * std::sqrt(static_cast<double>(columns_per_bit));
+  ring.profile = count == 0 ? 1.0 : std::sqrt(std::max(0.0, sum / count - std::min(0.15, column_noise * column_noise)));
+}
+
 bool RingDecoder::accepts(const DecodedRing& ring) const {
-  if (ring.unknown > max_unknown_ * bits_ || ring.fit > max_fit) return false;
+  if (ring.unknown > max_unknown_ * bits_ || ring.fit > max_fit || ring.profile > max_profile) return false;
   const bool corrected_for_sure = 2 * ring.wrong + ring.unknown < min_distance_;
   constexpr double sure_margin = 1.7;  // in wrong bits: two, less what unevenness takes
   const bool only_hidden = ring.wrong == 0 && ring.margin >= sure_margin;

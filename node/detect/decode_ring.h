@@ -14,7 +14,8 @@ struct DecodedRing {
   int unknown = 0;        ///< bits that show neither colour (a cover, dirt, outside the image)
   double distance = 0.0;  ///< wrong + unknown / 2, as [A] equation 14 counts
   double margin = 0.0;    ///< log likelihood above the best other id, in units of one wrong bit
-  double fit = 0.0;  ///< rms difference between the readings of known bits and the code's, in shares of their light
+  double fit = 0.0;      ///< rms difference between the readings of known bits and the code's, in shares of their light
+  double profile = 0.0;  ///< rms difference of the scan's columns to the code's blurred profile, noise taken out
   std::uint32_t code = 0;  ///< the code at its rotation: bit (bits - 1) is the scan's first
   bool accepted = false;
 };
@@ -41,6 +42,7 @@ class RingDecoder {
   struct Match;
   [[nodiscard]] DecodedRing decode_once(const RingScan& scan) const;
   [[nodiscard]] bool accepts(const DecodedRing& ring) const;
+  void compare_profile(const RingScan& scan, DecodedRing& ring) const;
   void compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const;
 
   int bits_;

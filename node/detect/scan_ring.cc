@@ -11,16 +11,15 @@
 namespace imprint {
 namespace {
 
-constexpr int columns_per_bit = 24;
-constexpr int rows = 5;
+constexpr int rows = 7;
 constexpr int neglected = 4;  // columns at each end of a bit, "Neg" of [A] 2.3.5
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0); }
 
-/// Middle of a scan row, in dot radii: the rows cover the middle 60 % of the ring.
+/// Middle of a scan row, in dot radii: the rows cover the middle 70 % of the ring.
 double row_radius(const TargetGeometry& geometry, int row) {
-  const double share = 0.2 + 0.6 * (row + 0.5) / rows;
+  const double share = 0.15 + 0.7 * (row + 0.5) / rows;
   return (geometry.ring_inner_radius + share * (geometry.ring_outer_radius - geometry.ring_inner_radius)) /
          geometry.dot_radius;
 }
@@ -44,11 +43,16 @@ std::vector<double> scan_columns(const ImagePyramid& pyramid, const FittedDot& d
     const double angle = two_pi * (i + 0.5) / columns;
     const Eigen::Vector2d direction = frame * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     double sum = 0.0;
+    int inside = 0;
     for (int row = 0; row < rows; ++row) {
       const Eigen::Vector2d p = center + row_radius(geometry, row) * direction;
-      sum += level.contains(p) ? level.bilinear(p) : std::numeric_limits<double>::quiet_NaN();
+      if (!level.contains(p)) continue;
+      sum += level.bilinear(p);
+      ++inside;
     }
-    readings[static_cast<std::size_t>(i)] = (sum / rows - dot.black) / dot.contrast;
+    // At the border of the image the inner rows may still tell.
+    readings[static_cast<std::size_t>(i)] =
+        inside == 0 ? std::numeric_limits<double>::quiet_NaN() : (sum / inside - dot.black) / dot.contrast;
   }
   return readings;
 }
@@ -99,29 +103,35 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
   const double outer = geometry.ring_outer_radius / geometry.dot_radius;
   const double bit_angle = two_pi / bits;
   constexpr double half_used = 0.5 - static_cast<double>(neglected) / columns_per_bit;
-  double radial = 0.0;
   BitResponse response;
+  response.radial = 0.0;
   for (int row = 0; row < rows; ++row) {
     const double r = row_radius(geometry, row);
-    radial += (normal_cdf((outer - r) / radial_sigma) - normal_cdf((inner - r) / radial_sigma)) / rows;
+    response.radial += (normal_cdf((outer - r) / radial_sigma) - normal_cdf((inner - r) / radial_sigma)) / rows;
     response.floor += normal_cdf((1.0 - r) / radial_sigma) / rows;
   }
   response.own = 0.0;
-  const double angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;  // in bits
+  response.angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;
   constexpr int steps = 5;
   for (int i = 0; i < steps; ++i) {
     const double at = half_used * (2.0 * (i + 0.5) / steps - 1.0);
-    const double left = normal_cdf((-0.5 - at) / angular_sigma);
-    const double right = normal_cdf((at - 0.5) / angular_sigma);
+    const double left = normal_cdf((-0.5 - at) / response.angular_sigma);
+    const double right = normal_cdf((at - 0.5) / response.angular_sigma);
     response.own += (1.0 - left - right) / steps;
     response.beside += 0.5 * (left + right) / steps;
   }
-  response.own *= radial;
-  response.beside *= radial;
+  response.own *= response.radial;
+  response.beside *= response.radial;
   return response;
 }
 
 }  // namespace
+
+double BitResponse::column_reading(double offset, int before, int bit, int after) const {
+  const double left = normal_cdf((-0.5 - offset) / angular_sigma);
+  const double right = normal_cdf((offset - 0.5) / angular_sigma);
+  return floor + light * radial * (left * before + (1.0 - left - right) * bit + right * after);
+}
 
 std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
                                   const TargetGeometry& geometry, double max_unknown) {
@@ -131,6 +141,7 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
   if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
   RingScan scan;
   const std::size_t first = first_column(columns, bits, &scan.deviation);
+  for (std::size_t i = 0; i < columns.size(); ++i) scan.columns.push_back(columns[(first + i) % columns.size()]);
   for (int bit = 0; bit < bits; ++bit) {
     const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
     scan.reading.push_back(read_bit(columns, begin).mean);

@@ -14,13 +14,19 @@ namespace imprint {
 struct BitResponse {
   double floor = 0.0;  ///< light of the dot that reaches the ring
   double own = 1.0;
-  double beside = 0.0;  ///< share of each of the two next bits
-  double light = 1.0;   ///< light at the bit in units of that at the dot's centre
+  double beside = 0.0;         ///< share of each of the two next bits
+  double radial = 1.0;         ///< share of a white arc's light that the scanned rows see
+  double angular_sigma = 0.0;  ///< blur along the ring, in bits
+  double light = 1.0;          ///< light at the bit in units of that at the dot's centre
 
   [[nodiscard]] double reading(int before, int bit, int after) const {
     return floor + light * (own * bit + beside * (before + after));
   }
+  /// The reading of one column, `offset` bits (-0.5 to 0.5) from the bit's middle.
+  [[nodiscard]] double column_reading(double offset, int before, int bit, int after) const;
 };
+
+inline constexpr int columns_per_bit = 24;
 
 /// What is read off a code ring, one value a bit, clockwise as seen from an arbitrary bit.
 struct RingScan {
@@ -28,10 +34,11 @@ struct RingScan {
   std::vector<BitResponse> response;
   std::vector<Eigen::Vector2d> place;  ///< middle of each bit in the frame of the dot, where that is the unit circle
   double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
+  std::vector<double> columns;         ///< mean reading of each column from the first bit's beginning on
   double deviation = 0.0;              ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
 };
 
-/// Scans the ring of a dot densely (24 columns a bit, 5 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
+/// Scans the ring of a dot densely (24 columns a bit, 7 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
 /// turns the columns so that the sum of the mean deviations within the bits is least. `dot` is in px of level 0; the
 /// scan takes the pyramid level whose pixels fit the dot's size, so that in large rings noise is averaged out.
 /// Nothing when more than `max_unknown` of the ring lies outside the image.
