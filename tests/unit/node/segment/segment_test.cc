@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "node/segment/segment_config.h"
+#include "node/segment/segment_prior.h"
 #include "tests/unit/node/segment/drawn_forging.h"
 
 namespace imprint {
@@ -197,6 +198,31 @@ TEST_CASE("segment: no forging is an error that says what was missing") {
     drawn::draw_bar(hall, {600, 350, 120, 100}, 255);
     CHECK_FALSE(message(drawn::expose(hall, 3, seed)).empty());
   }
+}
+
+TEST_CASE("segment: the prior follows rig and pose") {
+  CameraModel camera;
+  camera.id = "cam1", camera.width_px = 4656, camera.height_px = 3520, camera.focal_length_px = 5000;
+  camera.principal_point = {2327.5, 1759.5};
+  ForgingSpec forging;
+  forging.diameter_min_mm = 150, forging.diameter_max_mm = 300;
+  forging.axis_direction_world = {std::cos(0.3), std::sin(0.3), 0};
+  TargetField field;
+  for (int i = 0; i < 9; ++i) field.targets[i + 1].p_world_mm = {300.0 * (i % 3), 200.0 * (i / 3), 100.0 * i};
+  CameraPose pose;
+  pose.center_world_mm = {300, 200, -4600};  // the middle target stands at 400: 5000 mm away
+  const SegmentPrior p = make_segment_prior(camera, pose, forging, field);
+  CHECK(std::atan2(p.direction_y, p.direction_x) == Approx(0.3));
+  CHECK(p.diameter_min_px == Approx(100));
+  CHECK(p.diameter_max_px == Approx(500));
+
+  const cv::Mat image = drawn::expose(drawn::draw(plain_body(), kSize), 3, 1);
+  forging.axis_direction_world = {0, 0.1, 0.995};
+  const auto along = segment_forging(image, make_segment_prior(camera, pose, forging, field), {});
+  REQUIRE_FALSE(along);
+  CHECK(along.error().kind == ErrorKind::job_failed);
+  pose.center_world_mm.z() = 9000;
+  CHECK(make_segment_prior(camera, pose, forging, field).diameter_max_px == 0);
 }
 
 TEST_CASE("segment: unusable input is refused") {
