@@ -23,7 +23,7 @@ double grey_at(const cv::Mat& image, const ObservedPoint& p, bool invert) {
 }
 
 // Median over a band about the axis at one station; negative when the axis has left the image.
-double band_level(const cv::Mat& image, const ForgingFrame& frame, double station, const EndSearch& search,
+double band_level(const cv::Mat& image, const SilhouetteFrame& frame, double station, const EndSearch& search,
                   bool invert) {
   if (grey_at(image, frame.at(station, search.axis_offset_px), invert) < 0) return -1.0;
   std::vector<double> values;
@@ -82,7 +82,7 @@ bool fit_arc(const std::vector<ArcPoint>& points, double at, double half_band, L
 
 }  // namespace
 
-std::optional<double> walk_to_end(const cv::Mat& image, const ForgingFrame& frame, const EndSearch& search,
+std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search,
                                   Polarity polarity) {
   const bool invert = polarity == Polarity::dark;
   const double outward = search.at_start ? -1.0 : 1.0;
@@ -114,7 +114,7 @@ std::optional<double> walk_to_end(const cv::Mat& image, const ForgingFrame& fram
   return std::nullopt;
 }
 
-LocatedEnd locate_end(const cv::Mat& image, const ForgingFrame& frame, const EndSearch& search, Polarity polarity,
+LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search, Polarity polarity,
                       const EdgeConfig& config) {
   LocatedEnd end;
   end.station_px = search.station_px;

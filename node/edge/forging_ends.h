@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "node/edge/edge_config.h"
-#include "node/edge/forging_frame.h"
+#include "node/edge/silhouette_frame.h"
 #include "node/edge/locate_edges.h"
 
 namespace imprint {
@@ -18,12 +18,12 @@ struct EndSearch {
 
 /// The coarse station at which the body's brightness ends on the axis, walking outwards from inside; nothing when it
 /// goes on to the border of the image.
-std::optional<double> walk_to_end(const cv::Mat& image, const ForgingFrame& frame, const EndSearch& search,
+std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search,
                                   Polarity polarity);
 
 /// The end to subpixel: edges on scan lines along the axis (along pixel rows or columns) within a band about it, a
 /// parabola through them (the outline there is an arc of the end face), its value on the axis.
-LocatedEnd locate_end(const cv::Mat& image, const ForgingFrame& frame, const EndSearch& search, Polarity polarity,
+LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search, Polarity polarity,
                       const EdgeConfig& config);
 
 }  // namespace imprint

@@ -6,7 +6,7 @@
 
 #include "node/edge/edge_config.h"
 #include "node/edge/forging_ends.h"
-#include "node/edge/forging_frame.h"
+#include "node/edge/silhouette_frame.h"
 #include "node/edge/rim_edges.h"
 
 namespace imprint {
@@ -68,7 +68,7 @@ ExpectedRim expected_rim(const Segmentation& s, RimSide side, int first, int las
   return rim;
 }
 
-double saturated_fraction(const cv::Mat& image, const ForgingFrame& frame, const ExpectedRim& upper,
+double saturated_fraction(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& upper,
                           const ExpectedRim& lower) {
   const double full_scale = image.depth() == CV_16U ? 65535.0 : 255.0;
   std::size_t saturated = 0, count = 0;
@@ -112,7 +112,7 @@ Silhouette locate_edges(const cv::Mat& image, const Segmentation& segmentation, 
   const bool any = std::any_of(segmentation.upper_offset_px.begin(), segmentation.upper_offset_px.end(),
                                [](float v) { return !std::isnan(v); });
   if (!any || image.empty()) return silhouette;
-  const ForgingFrame frame(segmentation);
+  const SilhouetteFrame frame(segmentation);
 
   EndSearch start = describe_end(segmentation, true), end = describe_end(segmentation, false);
   double first = start.station_px, last = end.station_px;

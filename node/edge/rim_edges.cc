@@ -40,7 +40,7 @@ ScanRequest request(int index, ObservedPoint foot, const Expectation& e, const E
 double inward_sign(RimSide side) { return side == RimSide::upper ? 1.0 : -1.0; }
 
 // Scan lines normal to the axis, one a station.
-ScanLines scan_stations(const cv::Mat& image, const ForgingFrame& frame, const ExpectedRim& rim, double spacing_px,
+ScanLines scan_stations(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& rim, double spacing_px,
                         bool invert, const EdgeConfig& config) {
   const double sign = inward_sign(rim.side);
   std::vector<double> expected(rim.offset_px);
@@ -55,7 +55,7 @@ ScanLines scan_stations(const cv::Mat& image, const ForgingFrame& frame, const E
 }
 
 // Scan lines along the pixel columns (rows, when the axis runs more down than across).
-ScanLines scan_pixel_lines(const cv::Mat& image, const ForgingFrame& frame, const ExpectedRim& rim, bool invert,
+ScanLines scan_pixel_lines(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& rim, bool invert,
                            const EdgeConfig& config) {
   const bool columns = std::abs(frame.direction_x) >= std::abs(frame.direction_y);
   const double along_normal = columns ? frame.direction_x : -frame.direction_y;  // of the scanned image axis
@@ -150,7 +150,7 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
 
 }  // namespace
 
-RimEdges find_rim_edges(const cv::Mat& image, const ForgingFrame& frame, const ExpectedRim& rim, Polarity polarity,
+RimEdges find_rim_edges(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& rim, Polarity polarity,
                         EdgeMethod method, const EdgeConfig& config) {
   const bool invert = polarity == Polarity::dark;
   ScanLines scan;

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "node/edge/edge_config.h"
-#include "node/edge/forging_frame.h"
+#include "node/edge/silhouette_frame.h"
 #include "node/edge/locate_edges.h"
 
 namespace imprint {
@@ -26,7 +26,7 @@ struct RimEdges {
 /// `pixel`: the highest gradient of every scan line. The other methods of [C]: zero crossing on scan lines normal to
 /// the axis. `best`: a blurred step fitted to the pixels of every image column (row, for a forging that stands
 /// upright), where no interpolation blurs or ties the noise of neighbours, with the blur from its surroundings.
-RimEdges find_rim_edges(const cv::Mat& image, const ForgingFrame& frame, const ExpectedRim& rim, Polarity polarity,
+RimEdges find_rim_edges(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& rim, Polarity polarity,
                         EdgeMethod method, const EdgeConfig& config);
 
 }  // namespace imprint

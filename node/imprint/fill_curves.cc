@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "node/edge/forging_frame.h"
+#include "node/edge/silhouette_frame.h"
 #include "node/imprint/make_imprint.h"
 #include "node/imprint/rim_curve.h"
 
@@ -13,7 +13,7 @@ struct IdealSample {
   double weight;
 };
 
-std::vector<IdealSample> to_ideal(const std::vector<FilteredPoint>& points, const ForgingFrame& frame,
+std::vector<IdealSample> to_ideal(const std::vector<FilteredPoint>& points, const SilhouetteFrame& frame,
                                   const CameraModel& camera) {
   std::vector<IdealSample> ideal;
   ideal.reserve(points.size());
@@ -117,7 +117,7 @@ ImprintCurve fill_curve(const RimCurve& curve, const StationGrid& grid) {
   return out;
 }
 
-ImprintEnd map_end(const LocatedEnd& end, const ForgingFrame& frame, const CameraModel& camera,
+ImprintEnd map_end(const LocatedEnd& end, const SilhouetteFrame& frame, const CameraModel& camera,
                    const StationGrid& grid) {
   const CurveSample s = on_grid(grid, undistort(camera, frame.at(end.station_px, end.offset_px)));
   return {s.station_px, s.offset_px, end.sigma_px, end.visible};
@@ -126,7 +126,7 @@ ImprintEnd map_end(const LocatedEnd& end, const ForgingFrame& frame, const Camer
 }  // namespace
 
 Result<void> fill_curves(const FilteredSilhouette& silhouette, const CameraModel& camera, Imprint& imprint) {
-  const ForgingFrame frame(silhouette.frame);
+  const SilhouetteFrame frame(silhouette.frame);
   const auto axis = to_ideal(silhouette.axis, frame, camera);
   const auto trusted = std::count_if(axis.begin(), axis.end(), [](const IdealSample& s) { return s.weight > 0; });
   if (trusted < 2) return job_failed("{}: the axis has {} trusted points, at least 2 are needed", camera.id, trusted);

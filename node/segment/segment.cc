@@ -116,9 +116,6 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
   if (image.empty() || image.channels() != 1 || (image.depth() != CV_8U && image.depth() != CV_16U))
     return invalid_input("segment: expected an image of one channel with 8 or 16 bit, found {} x {}, {} channels",
                          image.cols, image.rows, image.channels());
-  if (prior.diameter_max_px == 0)
-    return job_failed(
-        "no forging: the camera looks along the rig's axis_direction, or the target field lies behind it");
   const double norm = std::hypot(prior.direction_x, prior.direction_y);
   if (!(std::abs(norm - 1.0) < 1e-3) || !(prior.diameter_min_px > 0) ||
       !(prior.diameter_max_px >= prior.diameter_min_px))

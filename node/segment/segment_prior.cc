@@ -22,26 +22,31 @@ double field_depth_mm(const CameraPose& pose, const TargetField& field) {
 
 }  // namespace
 
-SegmentPrior make_segment_prior(const CameraModel& camera, const CameraPose& pose, const ForgingSpec& forging,
-                                const TargetField& field) {
+Result<SegmentPrior> make_segment_prior(const CameraModel& camera, const CameraPose& pose, const ForgingSpec& forging,
+                                        const TargetField& field) {
   constexpr double kNearest = 0.6, kFarthest = 1.5;  // the forging stands among the targets, not in their middle
-  constexpr double kLeastAcross = 0.17;              // sine of 10 deg
-  SegmentPrior prior;
-  prior.polarity = forging.polarity;
   const double depth_mm = field_depth_mm(pose, field);
-  const Eigen::Vector3d axis_cam = pose.R_cam_world * forging.axis_direction_world;
-  if (!(depth_mm > 0) || std::hypot(axis_cam.x(), axis_cam.y()) < kLeastAcross) return prior;
+  if (!(depth_mm > 0)) return job_failed("{}: no target of the field lies in front of the camera", camera.id);
 
   // On the optical axis among the targets: in view whatever the field's shape is.
   const Eigen::Vector3d middle_cam_mm(0, 0, depth_mm);
+  const Eigen::Vector3d axis_cam = pose.R_cam_world * forging.axis_direction_world;
+  const double across = std::hypot(axis_cam.x(), axis_cam.y());
+  if (across < 0.17)
+    return job_failed(
+        "{}: the camera looks along the forging's axis ({:.0f} deg off it); a silhouette needs at least 10 deg",
+        camera.id, std::asin(std::min(across, 1.0)) * 57.2958);
   const double half_mm = 0.05 * depth_mm;
   const ObservedPoint a = project(camera, middle_cam_mm - half_mm * axis_cam);
   const ObservedPoint b = project(camera, middle_cam_mm + half_mm * axis_cam);
   const double length = std::hypot(b.x_px - a.x_px, b.y_px - a.y_px);
+
+  SegmentPrior prior;
   prior.direction_x = (b.x_px - a.x_px) / length;
   prior.direction_y = (b.y_px - a.y_px) / length;
   prior.diameter_min_px = camera.focal_length_px * forging.diameter_min_mm / (kFarthest * depth_mm);
   prior.diameter_max_px = camera.focal_length_px * forging.diameter_max_mm / (kNearest * depth_mm);
+  prior.polarity = forging.polarity;
   return prior;
 }
 

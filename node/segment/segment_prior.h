@@ -9,9 +9,8 @@ namespace imprint {
 
 /// Where and how large the forging can look in the observed image of a camera with this pose: its axis direction as
 /// seen at the field's middle, its width for all distances from 0.6 to 1.5 times that of the field's middle.
-/// When the field lies behind the camera or the camera looks along the axis (less than 10 deg off it) the diameters
-/// are 0, which `segment_forging` refuses.
-SegmentPrior make_segment_prior(const CameraModel& camera, const CameraPose& pose, const ForgingSpec& forging,
-                                const TargetField& field);
+/// Fails (job_failed) when the camera looks along the axis or the field lies behind it.
+Result<SegmentPrior> make_segment_prior(const CameraModel& camera, const CameraPose& pose, const ForgingSpec& forging,
+                                        const TargetField& field);
 
 }  // namespace imprint

@@ -211,18 +211,21 @@ TEST_CASE("segment: the prior follows rig and pose") {
   for (int i = 0; i < 9; ++i) field.targets[i + 1].p_world_mm = {300.0 * (i % 3), 200.0 * (i / 3), 100.0 * i};
   CameraPose pose;
   pose.center_world_mm = {300, 200, -4600};  // the middle target stands at 400: 5000 mm away
-  const SegmentPrior p = make_segment_prior(camera, pose, forging, field);
+  const auto given = make_segment_prior(camera, pose, forging, field);
+  REQUIRE(given);
+  const SegmentPrior& p = *given;
   CHECK(std::atan2(p.direction_y, p.direction_x) == Approx(0.3));
   CHECK(p.diameter_min_px == Approx(100));
   CHECK(p.diameter_max_px == Approx(500));
 
-  const cv::Mat image = drawn::expose(drawn::draw(plain_body(), kSize), 3, 1);
   forging.axis_direction_world = {0, 0.1, 0.995};
-  const auto along = segment_forging(image, make_segment_prior(camera, pose, forging, field), {});
+  const auto along = make_segment_prior(camera, pose, forging, field);
   REQUIRE_FALSE(along);
   CHECK(along.error().kind == ErrorKind::job_failed);
   pose.center_world_mm.z() = 9000;
-  CHECK(make_segment_prior(camera, pose, forging, field).diameter_max_px == 0);
+  const auto behind = make_segment_prior(camera, pose, forging, field);
+  REQUIRE_FALSE(behind);
+  CHECK(behind.error().message.find("cam1") != std::string::npos);
 }
 
 TEST_CASE("segment: unusable input is refused") {

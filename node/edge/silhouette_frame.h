@@ -7,11 +7,11 @@
 namespace imprint {
 
 /// Stations and offsets of a segmentation and points of the observed image, each from the other.
-struct ForgingFrame {
+struct SilhouetteFrame {
   ObservedPoint origin;
   double direction_x = 1.0, direction_y = 0.0;
 
-  explicit ForgingFrame(const Segmentation& s)
+  explicit SilhouetteFrame(const Segmentation& s)
       : origin(s.origin), direction_x(s.direction_x), direction_y(s.direction_y) {}
 
   [[nodiscard]] ObservedPoint at(double station_px, double offset_px) const {
