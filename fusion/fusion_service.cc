@@ -160,9 +160,9 @@ void FusionService::receive_trigger(const Message& message) {
   if (const auto valid = check_id("session", trigger->session); !valid) return malformed(message, valid.error().message);
   if (const auto bounds = assembler_.check(*trigger); !bounds) return malformed(message, bounds.error().message);
   bool is_new = false;
-  if (!surely<bool>([&] { return store_.add_trigger(*trigger, message.bytes, wall_clock_ns()); }, is_new) || !is_new) return;
-  spdlog::info("session {} observation {}: triggered, rotation {} deg", trigger->session, trigger->observation,
-               trigger->rotation_deg);
+  if (!surely<bool>([&] { return store_.add_trigger(*trigger, message.bytes, wall_clock_ns()); }, is_new)) return;
+  spdlog::info("session {} observation {}: triggered{}, rotation {} deg", trigger->session, trigger->observation,
+               is_new ? "" : " again", trigger->rotation_deg);
   if (assembler_.knows(trigger->session)) {
     (void)assembler_.add(*trigger, std::chrono::steady_clock::now());  // within bounds, as checked
   } else {

@@ -1,0 +1,59 @@
+#include "fusion/fusion_config.h"
+
+#include <catch2/catch.hpp>
+
+#include "tests/unit/temporary_folder.h"
+
+namespace imprint {
+namespace {
+
+Result<FusionConfig> read(const TemporaryFolder& folder, const std::string& text) {
+  const auto path = folder.write("fusion.toml", text);
+  const auto table = parse_toml_file(path);
+  REQUIRE(table);
+  return read_fusion_config(path, *table);
+}
+
+std::string fault(const std::string& text) {
+  const TemporaryFolder folder;
+  const auto config = read(folder, text);
+  REQUIRE_FALSE(config);
+  REQUIRE(config.error().exit_status() == 2);
+  return config.error().message;
+}
+
+}  // namespace
+
+TEST_CASE("fusion config: the rig is enough; it routes on this machine only and the page is this machine's only") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, "[fusion]\nrig = \"rig.toml\"\n");
+  REQUIRE(config);
+  REQUIRE(config->zenoh.router);
+  REQUIRE(config->zenoh.listen == std::vector<std::string>{"tcp/127.0.0.1:7447"});
+  REQUIRE(config->page.address == "127.0.0.1");
+  REQUIRE(config->database == folder / "imprint.db");
+  REQUIRE(config->result_dir.empty());
+}
+
+TEST_CASE("fusion config: what is printed reads back as the same config") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, "[fusion]\nrig = \"rig.toml\"\nresult_dir = \"out\"\ndeadline_s = 2.5\n[page]\nport = 0\n");
+  REQUIRE(config);
+  const auto again = read(folder, to_toml(*config));
+  REQUIRE(again);
+  REQUIRE(to_toml(*again) == to_toml(*config));
+  REQUIRE(again->assembler.deadline_s == 2.5);
+  REQUIRE(again->result_dir == folder / "out");
+}
+
+TEST_CASE("fusion config: a fault names the file, the line and the key") {
+  REQUIRE(fault("[fusion]\nrig = \"r\"\ndeadline_s = 0\n").find("fusion.toml:3: fusion.deadline_s: ") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[page]\nport = 99999999999\n").find("fusion.toml:4: page.port: ") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\nsite = \"a/b\"\n").find("fusion.toml:3: fusion.site") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\ndead_line_s = 3\n").find("fusion.toml:3: fusion.dead_line_s: unknown key") != std::string::npos);
+  REQUIRE(fault("rig = \"r\"\n").find("unknown key") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = [7447]\n").find("zenoh.listen: expected a list of texts") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = []\n").find("zenoh.listen") != std::string::npos);
+}
+
+}  // namespace imprint

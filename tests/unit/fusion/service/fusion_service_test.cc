@@ -1,0 +1,264 @@
+#include "fusion/fusion_service.h"
+
+#include <mutex>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "tests/unit/temporary_folder.h"
+
+namespace imprint {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A measurement that only tells what went into it.
+Result<Measurement> count_imprints(const std::vector<Observation>& observations, const ForgingSpec& /*forging*/,
+                                   std::string session, std::string method) {
+  Measurement measurement;
+  measurement.session = std::move(session);
+  measurement.method = std::move(method);
+  for (const Observation& observation : observations) {
+    measurement.observations.push_back({observation.index, observation.rotation_deg, {}});
+    measurement.length_mm += static_cast<double>(observation.imprints.size());
+    for (const auto& [camera, why] : observation.missing) measurement.warnings.push_back(camera + ": " + why);
+  }
+  if (measurement.length_mm == 0.0) return job_failed("no imprint at all");
+  return measurement;
+}
+
+bool eventually(const std::function<bool()>& condition) {
+  for (int i = 0; i < 500; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(10ms);
+  }
+  return false;
+}
+
+// Three cameras on one bus with a fusion that can be started and stopped, its store on disk.
+struct Plant {
+  TemporaryFolder folder;
+  std::shared_ptr<MemoryBus> bus = make_memory_bus();
+  std::unique_ptr<Transport> outside = open_memory(bus);
+  Keys keys = *Keys::of("plant", "L1");
+  std::unique_ptr<Publisher> triggers = *outside->publish(keys.trigger(), {.traffic = Traffic::command, .history = 16});
+  std::map<std::string, std::unique_ptr<Publisher>> imprints;
+  std::mutex mutex;
+  std::vector<ResultMessage> results;
+  std::vector<Trigger> seen_triggers;
+  std::vector<std::unique_ptr<Declaration>> declarations;
+  FusionConfig config;
+
+  std::unique_ptr<SessionStore> store;
+  std::unique_ptr<LineBoard> board;
+  std::unique_ptr<Transport> inside;
+  std::unique_ptr<FusionService> fusion;
+
+  explicit Plant(double deadline_s = 30.0) {
+    config.assembler.deadline_s = deadline_s;
+    config.result_dir = folder / "results";
+    for (const char* camera : {"cam1", "cam2", "cam3"}) {
+      imprints[camera] = *outside->publish(keys.imprint(camera), {.traffic = Traffic::imprint, .history = 256});
+    }
+    declarations.push_back(*outside->subscribe(keys.result(), {}, [this](const Sample& sample) {
+      const std::lock_guard lock(mutex);
+      results.push_back(*decode_result(sample.payload));
+    }));
+    declarations.push_back(*outside->subscribe(keys.trigger(), {}, [this](const Sample& sample) {
+      const std::lock_guard lock(mutex);
+      seen_triggers.push_back(*decode_trigger(sample.payload));
+    }));
+    start();
+  }
+
+  void start() {
+    Rig rig;
+    for (const char* camera : {"cam1", "cam2", "cam3"}) {
+      rig.cameras.emplace_back();
+      rig.cameras.back().id = camera;
+    }
+    store = *SessionStore::open(folder / "imprint.db");
+    board = std::make_unique<LineBoard>(LineBoard::Identity{"plant", "L1", "best", "0"},
+                                        std::vector<std::string>{"cam1", "cam2", "cam3"}, std::chrono::steady_clock::now());
+    inside = open_memory(bus);
+    fusion = std::make_unique<FusionService>(config, rig, *inside, *store, *board, count_imprints);
+    REQUIRE(fusion->start());
+  }
+
+  void stop() {
+    fusion.reset();
+    inside.reset();
+    store.reset();
+  }
+
+  void trigger(std::uint32_t observation, std::uint32_t expected, const std::string& session = "S") {
+    REQUIRE(triggers->put(encode_trigger({session, observation, 90.0 * observation, 0, expected})));
+  }
+
+  void answer(const std::string& camera, std::uint32_t observation, std::uint64_t sequence, const std::string& session = "S") {
+    Imprint imprint;
+    imprint.camera_id = camera;
+    imprint.session = session;
+    imprint.observation = observation;
+    imprint.rotation_deg = 90.0 * observation;
+    imprint.boot_id = 5;
+    imprint.sequence = sequence;
+    imprint.failure = "no forging found";
+    REQUIRE(imprints.at(camera)->put(encode_imprint(imprint)));
+  }
+
+  std::size_t result_count() {
+    const std::lock_guard lock(mutex);
+    return results.size();
+  }
+  ResultMessage last_result() {
+    const std::lock_guard lock(mutex);
+    return results.back();
+  }
+  nlohmann::json status() {
+    const auto replies = outside->get(keys.fusion_service("status"), {}, 2s);
+    REQUIRE(replies);
+    REQUIRE(replies->size() == 1);
+    return nlohmann::json::parse(replies->front().payload);
+  }
+  double counted(const std::string& counter) { return status()["counters"][counter]; }
+};
+
+double length_of(const ResultMessage& result) { return nlohmann::json::parse(result.json)["length_mm"]; }
+
+}  // namespace
+
+TEST_CASE("fusion: a session's result is stored before it is announced, once an observation, complete with the last") {
+  Plant plant;
+  plant.trigger(0, 2);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  REQUIRE_FALSE(plant.last_result().complete);
+  REQUIRE(plant.store->result("S")->value().json == plant.last_result().json);
+  plant.trigger(1, 2);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 1, 2);
+  REQUIRE(eventually([&] { return plant.result_count() == 2; }));
+  REQUIRE(plant.last_result().complete);
+  REQUIRE(length_of(plant.last_result()) == 6.0);
+  REQUIRE(plant.store->result("S")->value().complete);
+  REQUIRE(std::filesystem::exists(plant.folder / "results/S/result.json"));
+}
+
+TEST_CASE("fusion: a camera that never reports is named after the deadline") {
+  Plant plant(0.3);
+  plant.trigger(0, 1);
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam2", 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  REQUIRE(plant.last_result().complete);
+  REQUIRE(plant.last_result().json.find("cam3: not connected, no imprint within 0.3 s") != std::string::npos);
+  plant.answer("cam3", 0, 1);  // late
+  REQUIRE(eventually([&] { return plant.result_count() == 2; }));
+  REQUIRE(length_of(plant.last_result()) == 3.0);
+}
+
+TEST_CASE("fusion: an observation without any imprint gives a result that says why there is none") {
+  Plant plant(0.2);
+  plant.trigger(0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  REQUIRE(plant.last_result().error == "no imprint at all");
+  REQUIRE(plant.last_result().json.empty());
+}
+
+TEST_CASE("fusion: stopped after the first observation and started again, the result has both") {
+  Plant plant;
+  plant.trigger(0, 2);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  plant.stop();
+  plant.start();
+  plant.trigger(1, 2);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 1, 2);
+  REQUIRE(eventually([&] { return plant.result_count() >= 1 && plant.last_result().complete; }));
+  REQUIRE(length_of(plant.last_result()) == 6.0);
+}
+
+TEST_CASE("fusion: imprints sent while it was away are taken from the nodes' history") {
+  Plant plant;
+  plant.stop();
+  plant.trigger(0, 1);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 0, 1);
+  plant.start();
+  REQUIRE(eventually([&] { return plant.result_count() >= 1 && plant.last_result().complete; }));
+  REQUIRE(length_of(plant.last_result()) == 3.0);
+}
+
+TEST_CASE("fusion: a late imprint of a finished session after a restart adds to it and replaces nothing") {
+  Plant plant(0.3);
+  plant.trigger(0, 1);
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam2", 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  plant.stop();
+  plant.start();
+  plant.answer("cam3", 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 2; }));
+  REQUIRE(length_of(plant.last_result()) == 3.0);
+  REQUIRE(plant.last_result().complete);
+}
+
+TEST_CASE("fusion: a camera that connects while it is waited for is sent the trigger again, no other is") {
+  Plant plant;
+  plant.trigger(0, 1);
+  plant.answer("cam1", 0, 1);
+  REQUIRE(eventually([&] { return plant.counted("imprints") == 1; }));
+  const auto answered = plant.outside->announce(plant.keys.alive("cam1"));
+  REQUIRE(eventually([&] { return plant.status()["cameras"][0]["alive"] == true; }));
+  std::this_thread::sleep_for(50ms);
+  {
+    const std::lock_guard lock(plant.mutex);
+    REQUIRE(plant.seen_triggers.size() == 1);
+  }
+  const auto waited_for = plant.outside->announce(plant.keys.alive("cam2"));
+  REQUIRE(eventually([&] {
+    const std::lock_guard lock(plant.mutex);
+    return plant.seen_triggers.size() == 2;
+  }));
+  const std::lock_guard lock(plant.mutex);
+  REQUIRE(plant.seen_triggers[1].session == "S");
+  REQUIRE(plant.seen_triggers[1].observation == 0);
+}
+
+TEST_CASE("fusion: what is malformed, too large, of a foreign camera or under a foreign key is dropped and counted") {
+  Plant plant;
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam1", 0, 1);  // once more
+  REQUIRE(plant.imprints["cam1"]->put(Bytes{1, 2, 3}));
+  REQUIRE(plant.imprints["cam1"]->put(Bytes(1'000'000, 7)));
+  REQUIRE(plant.triggers->put(Bytes{0xFF}));
+  auto foreign = plant.outside->publish(plant.keys.imprint("cam9"), {});
+  REQUIRE(foreign);
+  Imprint imprint;
+  imprint.camera_id = "cam9";
+  imprint.session = "S";
+  imprint.sequence = 1;
+  imprint.failure = "x";
+  REQUIRE((*foreign)->put(encode_imprint(imprint)));
+  imprint.camera_id = "cam2";  // pretends to be another
+  REQUIRE((*foreign)->put(encode_imprint(imprint)));
+  REQUIRE(eventually([&] { return plant.counted("malformed") == 4; }));
+  REQUIRE(plant.counted("refused") == 1);
+  REQUIRE(plant.counted("imprints") == 1);
+  REQUIRE(plant.counted("repeated") == 1);
+  REQUIRE(plant.store->messages("S")->size() == 1);
+}
+
+TEST_CASE("fusion: it answers what a session's result is, and that there is none") {
+  Plant plant(0.2);
+  REQUIRE_FALSE(plant.outside->get(plant.keys.fusion_service("result") + "?session=S", {}, 2s));
+  plant.trigger(0, 1);
+  plant.answer("cam1", 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  const auto replies = plant.outside->get(plant.keys.fusion_service("result") + "?session=S", {}, 2s);
+  REQUIRE(replies);
+  const auto document = nlohmann::json::parse(replies->at(0).payload);
+  REQUIRE(document["session"] == "S");
+  REQUIRE(document["result"]["length_mm"] == 1.0);
+}
+
+}  // namespace imprint

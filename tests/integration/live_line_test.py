@@ -1,0 +1,321 @@
+"""The running line: real processes over Zenoh on loopback, fed with a small rendered session.
+
+Meson passes the programs and the scene in the environment: IMPRINT, IMPRINT_NODE, IMPRINT_FUSION, IMPRINT_SCENE.
+"""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import tomllib
+import unittest
+import urllib.error
+import urllib.request
+
+IMPRINT, NODE, FUSION, SCENE = (os.environ[name] for name in ("IMPRINT", "IMPRINT_NODE", "IMPRINT_FUSION", "IMPRINT_SCENE"))
+SANITIZED_FACTOR = float(os.environ.get("IMPRINT_TEST_PATIENCE", "1"))  # sanitizer builds are slower
+PATIENCE_S = 60 * SANITIZED_FACTOR  # a busy machine may take long; nothing here waits for it when all is well
+SAME_MM = 0.01  # what the distributed run may differ from `imprint measure`: the rounding of curves on the wire
+
+work = data = reference = rotations = None
+
+
+def setUpModule():
+    global work, data, reference, rotations
+    work = pathlib.Path(tempfile.mkdtemp(prefix="imprint-integration-"))
+    data = work / "session"
+    subprocess.run([IMPRINT, "simulate", SCENE, "--out", data], check=True, stdout=subprocess.DEVNULL)
+    measured = subprocess.run([IMPRINT, "measure", data / "session.toml", "--json"], check=True, capture_output=True)
+    reference = json.loads(measured.stdout)
+    with open(data / "session.toml", "rb") as file:
+        rotations = [observation["rotation_deg"] for observation in tomllib.load(file)["observation"]]
+
+
+def tearDownModule():
+    shutil.rmtree(work, ignore_errors=True)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def imprint(*arguments):
+    return subprocess.run([IMPRINT, *map(str, arguments)], capture_output=True, text=True, timeout=2 * PATIENCE_S, check=False)
+
+
+class Line:
+    """Processes of one line in a folder of their own; all are gone when the block is left."""
+
+    def __init__(self, deadline_s=PATIENCE_S, images=None):
+        self.folder = pathlib.Path(tempfile.mkdtemp(dir=work))
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.page = free_port()
+        self.processes = {}
+        self.fusion_config = self.write("fusion.toml", f"""
+[fusion]
+rig = "{data / 'rig.toml'}"
+database = "imprint.db"
+result_dir = "results"
+deadline_s = {deadline_s}
+[zenoh]
+listen = ["{self.endpoint}"]
+[page]
+port = {self.page}
+""")
+        self.node_config = self.write("node.toml", f"""
+[node]
+camera_id = "cam1"
+rig = "{data / 'rig.toml'}"
+[capture]
+source = "folder"
+path = "{images or data}"
+[zenoh]
+connect = ["{self.endpoint}"]
+[health]
+period_s = 0.5
+""")
+
+    def write(self, name, text):
+        (self.folder / name).write_text(text, encoding="utf-8")
+        return self.folder / name
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in self.processes.values():
+            process.kill()
+        for process in self.processes.values():
+            process.wait()
+
+    def start(self, name, command):
+        log = open(self.folder / f"{name}.log", "ab")
+        self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log)
+
+    def start_fusion(self):
+        self.start("fusion", [FUSION, "--config", self.fusion_config])
+
+    def start_nodes(self, *cameras):
+        for camera in cameras:
+            self.start(camera, [NODE, "--config", self.node_config, "--set", f"node.camera_id={camera}"])
+
+    def end(self, name, with_signal):
+        """Ends a process and gives its exit status and how long that took."""
+        begin = time.monotonic()
+        self.processes[name].send_signal(with_signal)
+        return self.processes.pop(name).wait(PATIENCE_S), time.monotonic() - begin
+
+    def status(self):
+        done = imprint("status", "--connect", self.endpoint, "--timeout", PATIENCE_S, "--json")
+        return json.loads(done.stdout) if done.returncode == 0 else None
+
+    def wait_for(self, condition, what):
+        until = time.monotonic() + PATIENCE_S
+        while time.monotonic() < until:
+            status = self.status()
+            if status and condition(status):
+                return status
+            time.sleep(0.1)
+        raise AssertionError(f"not within {PATIENCE_S} s: {what}\n{self.logs()}")
+
+    def wait_alive(self, *cameras):
+        return self.wait_for(lambda status: {c["id"] for c in status["cameras"] if c["alive"]} == set(cameras),
+                             f"cameras {cameras} alive")
+
+    def trigger(self, observation, expect, wait=True, session="S"):
+        arguments = ["trigger", "--connect", self.endpoint, "--session", session, "--observation", observation,
+                     f"--rotation-deg={rotations[observation]}", "--expect", expect, "--json"]
+        done = imprint(*arguments, *(["--wait", PATIENCE_S] if wait else []))
+        if done.returncode != 0:
+            raise AssertionError(f"trigger: {done.stderr}\n{self.logs()}")
+        return json.loads(done.stdout)
+
+    def result(self, session="S"):
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.page}/api/result/{session}", timeout=10) as answer:
+            return json.load(answer)
+
+    def logs(self):
+        return "\n".join(f"--- {log.name}\n{log.read_text(errors='replace')}" for log in sorted(self.folder.glob("*.log")))
+
+
+class LiveLineTest(unittest.TestCase):
+    def assert_same_geometry(self, result, expected):
+        self.assertEqual(len(result["observations"]), len(expected["observations"]))
+        for key in ("length_mm", "max_deflection_mm"):
+            self.assertAlmostEqual(result[key], expected[key], delta=SAME_MM, msg=key)
+        self.assertEqual(len(result["sections"]), len(expected["sections"]))
+        for ours, theirs in zip(result["sections"], expected["sections"]):
+            for key in ("s_mm", "deflection_mm", "diameter_mm", "circularity_mm"):
+                self.assertAlmostEqual(ours[key], theirs[key], delta=SAME_MM, msg=key)
+            for a, b in zip(ours["axis_mm"], theirs["axis_mm"]):
+                self.assertAlmostEqual(a, b, delta=SAME_MM)
+
+    def test_distributed_run_equals_measure(self):
+        with Line() as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            watch = subprocess.Popen([IMPRINT, "watch", "--connect", line.endpoint, "--results", "--count", str(len(rotations)),
+                                      "--timeout", str(3 * PATIENCE_S), "--json"], stdout=subprocess.PIPE)
+            time.sleep(1)  # the watch has nothing to say that it listens
+            for observation in range(len(rotations)):
+                result = line.trigger(observation, len(rotations))
+            self.assert_same_geometry(result, reference)
+            self.assertEqual(result["observations"][1]["rotation_deg"], rotations[1])
+            self.assertTrue(line.result()["complete"])
+            written = json.loads((line.folder / "results" / "S" / "result.json").read_text())
+            self.assertEqual(written, result)
+            events = json.loads(watch.communicate(timeout=PATIENCE_S)[0])
+            self.assertEqual(watch.returncode, 0)
+            self.assertEqual([event["complete"] for event in events], [False] * (len(rotations) - 1) + [True])
+            self.assertEqual(events[-1]["result"], result)
+
+            for path in ("/", "/api/status", "/api/cameras", "/api/sessions", "/api/result/latest", "/healthz"):
+                with urllib.request.urlopen(f"http://127.0.0.1:{line.page}{path}", timeout=10) as answer:
+                    self.assertEqual(answer.status, 200, path)
+            with self.assertRaises(urllib.error.HTTPError) as refused:
+                line.result("another")
+            self.assertEqual(refused.exception.code, 404)
+            refused.exception.close()
+
+            for name in ("cam1", "fusion", "cam2", "cam3"):
+                status, took_s = line.end(name, signal.SIGTERM)
+                self.assertEqual(status, 0, name)
+                self.assertLess(took_s, 3 * SANITIZED_FACTOR, name)  # idle: nothing to finish
+
+    def test_camera_that_never_reports_is_left_out_and_named(self):
+        with Line(deadline_s=5 * SANITIZED_FACTOR) as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2")
+            line.wait_alive("cam1", "cam2")
+            result = line.trigger(0, 1)
+            cameras = {camera["id"]: camera["excluded"] for camera in result["observations"][0]["cameras"]}
+            self.assertEqual(cameras, {"cam1": False, "cam2": False, "cam3": True})
+            self.assertTrue(any("cam3" in warning and "not connected" in warning for warning in result["warnings"]),
+                            result["warnings"])
+
+    def test_nobody_reports_and_the_trigger_says_who(self):
+        with Line(deadline_s=30 * SANITIZED_FACTOR) as line:
+            line.start_fusion()
+            done = imprint("trigger", "--connect", line.endpoint, "--session", "S", "--expect", 1, "--wait", 3)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("cam1, cam2, cam3", done.stderr)
+            self.assertEqual(done.stdout, "")
+
+    def test_fusion_started_last(self):
+        with Line() as line:
+            line.start_nodes("cam1", "cam2", "cam3")
+            time.sleep(1)
+            line.start_fusion()
+            line.wait_alive("cam1", "cam2", "cam3")
+            self.assertEqual(len(line.trigger(0, 1)["observations"]), 1)
+
+    def test_node_killed_in_the_middle_is_triggered_again_when_it_is_back(self):
+        with Line() as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            line.trigger(0, 2)
+            line.end("cam2", signal.SIGKILL)
+            line.wait_alive("cam1", "cam3")
+            line.trigger(1, 2, wait=False)
+            line.wait_for(lambda status: status["session"]["observations"][1]["waiting"] == ["cam2"], "only cam2 is waited for")
+            line.start_nodes("cam2")
+            line.wait_for(lambda status: status["last_result"]["complete"], "session complete")
+            result = line.result()["result"]
+            self.assertEqual([o["index"] for o in result["observations"]], [0, 1])
+            for observation in result["observations"]:
+                self.assertFalse(any(camera["excluded"] for camera in observation["cameras"]), result["warnings"])
+
+    def test_fusion_killed_after_the_first_observation_loses_nothing(self):
+        with Line() as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            line.trigger(0, len(rotations))
+            line.end("fusion", signal.SIGKILL)
+            time.sleep(1)
+            line.start_fusion()
+            line.wait_alive("cam1", "cam2", "cam3")
+            for observation in range(1, len(rotations)):
+                result = line.trigger(observation, len(rotations))
+            self.assert_same_geometry(result, reference)
+            self.assertTrue(line.result()["complete"])
+
+    def test_fusion_killed_while_cameras_answer_gets_their_imprints_later(self):
+        with Line() as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            line.trigger(0, 1, wait=False)
+            line.end("fusion", signal.SIGKILL)
+            line.start_fusion()
+            line.wait_for(lambda status: status["last_result"] and status["last_result"]["complete"], "session complete")
+            cameras = line.result()["result"]["observations"][0]["cameras"]
+            self.assertEqual([camera["id"] for camera in cameras if not camera["excluded"]], ["cam1", "cam2", "cam3"])
+
+    def test_damaged_picture_fails_its_camera_at_once_and_by_name(self):
+        images = pathlib.Path(tempfile.mkdtemp(dir=work))
+        for camera in ("cam1", "cam2", "cam3"):
+            picture = (data / f"obs00_{camera}.png").read_bytes()
+            (images / f"obs00_{camera}.png").write_bytes(picture[: len(picture) // 2] if camera == "cam2" else picture)
+        with Line(images=images) as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            result = line.trigger(0, 1)
+            self.assertTrue(any("cam2" in warning and "obs00_cam2.png" in warning for warning in result["warnings"]),
+                            result["warnings"])
+            health = line.wait_for(lambda status: status["cameras"][1]["health"]["failed_frames"] == 1, "health of cam2")
+            self.assertEqual(health["cameras"][0]["health"]["failed_frames"], 0)
+
+    def test_no_fusion_no_trigger(self):
+        begin = time.monotonic()
+        done = imprint("trigger", "--connect", f"tcp/127.0.0.1:{free_port()}", "--session", "S", "--wait", 60)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("is imprint-fusion running?", done.stderr)
+        self.assertLess(time.monotonic() - begin, 20 * SANITIZED_FACTOR)
+
+
+class BadConfigTest(unittest.TestCase):
+    def refused(self, program, config, *arguments):
+        done = subprocess.run([program, "--config", str(config), *arguments], capture_output=True, text=True,
+                              timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(done.stdout, "")
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)  # one line for a person
+        return done.stderr
+
+    def test_good_configs_are_said_to_be_good(self):
+        with Line() as line:
+            for program, config in ((NODE, line.node_config), (FUSION, line.fusion_config)):
+                checked = subprocess.run([program, "--config", str(config), "--check"], capture_output=True, text=True, check=False)
+                self.assertEqual((checked.returncode, checked.stdout), (0, f"{config}: OK\n"), checked.stderr)
+                printed = subprocess.run([program, "--config", str(config), "--print-config"], capture_output=True, text=True,
+                                         check=True)
+                tomllib.loads(printed.stdout)
+            self.assertFalse((line.folder / "imprint.db").exists())  # a check leaves nothing behind
+
+    def test_faults_name_file_line_and_key(self):
+        with Line() as line:
+            broken = line.write("broken.toml", "[node]\ncamera_id = \"cam1\"\nrig = \n")
+            self.assertIn("broken.toml:3:", self.refused(NODE, broken))
+            wrong = line.write("wrong.toml", line.fusion_config.read_text().replace("deadline_s = ", "deadline_s = -"))
+            number = wrong.read_text().split("\n").index(next(l for l in wrong.read_text().split("\n") if "deadline_s" in l)) + 1
+            self.assertIn(f"wrong.toml:{number}: fusion.deadline_s", self.refused(FUSION, wrong))
+            self.assertIn("missing.toml", self.refused(FUSION, line.folder / "missing.toml"))
+            self.assertIn("cam9", self.refused(NODE, line.node_config, "--set", "node.camera_id=cam9", "--check"))
+            self.assertIn("nowhere", self.refused(NODE, line.node_config, "--set", "capture.path=nowhere"))
+            self.assertIn("norig.toml", self.refused(FUSION, line.fusion_config, "--set", "fusion.rig=norig.toml"))
+            self.assertIn("no/folder", self.refused(FUSION, line.fusion_config, "--set", "fusion.database=no/folder/a.db", "--check"))
+            self.assertIn("page.port", self.refused(FUSION, line.fusion_config, "--set", "page.port=70000"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
