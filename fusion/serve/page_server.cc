@@ -37,6 +37,11 @@ class HttpPageServer final : public PageServer {
   HttpPageServer& operator=(const HttpPageServer&) = delete;
 
   Result<void> listen(const PageConfig& config) {
+    // The library's own choice, SO_REUSEPORT, would let two programs share the port unnoticed.
+    server_.set_socket_options([](socket_t socket) {
+      const int yes = 1;
+      ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
     port_ = config.port == 0 ? server_.bind_to_any_port(config.address)
                              : (server_.bind_to_port(config.address, config.port) ? config.port : -1);
     if (port_ <= 0) {
