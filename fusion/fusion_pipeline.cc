@@ -36,7 +36,8 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
   std::vector<std::string> warnings;
   std::string first_failure;
   for (const Observation& observation : observations) {
-    Measurement::Observation report{.index = observation.index, .rotation_deg = observation.rotation_deg, .cameras = {}};
+    Measurement::Observation report{
+        .index = observation.index, .rotation_deg = observation.rotation_deg, .cameras = {}};
     auto triangulated = triangulate(observation.imprints, forging, TriangulateConfig{});
     if (triangulated) {
       report.cameras = triangulated->cameras;

@@ -25,27 +25,32 @@ IdealAxis ideal_axis(std::span<const double> x_mm, std::span<const Eigen::Vector
   const std::size_t n = x_mm.size();
   axis.level_weight.assign(n, 0.0);
   axis.slope_weight.assign(n, 0.0);
+  axis.x_mean_mm = 0.5 * (first_mm + last_mm);
   const double reach = std::min(end_section_mm, 0.5 * (last_mm - first_mm));
-  double count = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    // Half a micrometre of slack so that a sample on the border is not lost to rounding.
-    const bool in_first = x_mm[i] >= first_mm - 5e-4 && x_mm[i] <= first_mm + reach + 5e-4;
-    const bool in_last = x_mm[i] <= last_mm + 5e-4 && x_mm[i] >= last_mm - reach - 5e-4;
-    if (!in_first && !in_last) continue;
-    axis.level_weight[i] = 1.0;
-    axis.x_mean_mm += x_mm[i];
-    count += 1.0;
+  // Points spread evenly over both end sections, between the given ones, so that the line does not depend on which
+  // of those happen to lie inside.
+  constexpr int kPoints = 40;
+  const double spread = [&] {
+    double sum = 0.0;
+    for (int i = 0; i < kPoints; ++i)
+      sum += 2.0 * std::pow(0.5 * (last_mm - first_mm) - reach * (i + 0.5) / kPoints, 2);
+    return sum;
+  }();
+  std::size_t k = 0;
+  for (int i = 0; i < 2 * kPoints; ++i) {
+    const bool in_first = i < kPoints;
+    const double share = ((in_first ? i : i - kPoints) + 0.5) / kPoints;
+    const double x = in_first ? first_mm + reach * share : last_mm - reach * (1.0 - share);
+    while (k + 2 < n && x_mm[k + 1] < x) ++k;
+    const double u = (x - x_mm[k]) / (x_mm[k + 1] - x_mm[k]);
+    const double level = 0.5 / kPoints;
+    const double slope = (x - axis.x_mean_mm) / spread;
+    axis.level_weight[k] += (1.0 - u) * level;
+    axis.level_weight[k + 1] += u * level;
+    axis.slope_weight[k] += (1.0 - u) * slope;
+    axis.slope_weight[k + 1] += u * slope;
   }
-  axis.x_mean_mm /= count;
-  double spread = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    if (axis.level_weight[i] == 0.0) continue;
-    axis.level_weight[i] = 1.0 / count;
-    axis.slope_weight[i] = x_mm[i] - axis.x_mean_mm;
-    spread += axis.slope_weight[i] * axis.slope_weight[i];
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    axis.slope_weight[i] /= spread;
     axis.mean_mm += axis.level_weight[i] * yz_mm[i];
     axis.slope += axis.slope_weight[i] * yz_mm[i];
   }

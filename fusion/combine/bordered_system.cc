@@ -14,7 +14,8 @@ void BorderedSystem::forward(Eigen::Ref<Eigen::MatrixXd> columns) const {
   for (int i = 0; i < nodes(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     auto rows = columns.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
-    if (i > 0) rows.noalias() -= coupled_[k - 1].transpose() * columns.middleRows<kNodeUnknowns>((i - 1) * kNodeUnknowns);
+    if (i > 0)
+      rows.noalias() -= coupled_[k - 1].transpose() * columns.middleRows<kNodeUnknowns>((i - 1) * kNodeUnknowns);
     factor_[k].triangularView<Eigen::Lower>().solveInPlace(rows);
   }
 }
@@ -60,7 +61,8 @@ bool BorderedSystem::solve() {
   backward(state);
   if (!state.allFinite()) return false;
   node_solution.resize(diagonal.size());
-  for (int i = 0; i < n; ++i) node_solution[static_cast<std::size_t>(i)] = state.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
+  for (int i = 0; i < n; ++i)
+    node_solution[static_cast<std::size_t>(i)] = state.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
   return true;
 }
 

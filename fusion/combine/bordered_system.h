@@ -18,11 +18,11 @@ class BorderedSystem {
   BorderedSystem(int nodes, int border);
 
   // The normal matrix and its right side, to be filled by adding.
-  std::vector<NodeMatrix> diagonal;   ///< (i, i), lower half used
-  std::vector<NodeMatrix> upper;      ///< (i, i + 1)
+  std::vector<NodeMatrix> diagonal;  ///< (i, i), lower half used
+  std::vector<NodeMatrix> upper;     ///< (i, i + 1)
   std::vector<NodeVector> right;
-  Eigen::MatrixXd border;             ///< (node unknowns, border)
-  Eigen::MatrixXd corner;             ///< (border, border)
+  Eigen::MatrixXd border;  ///< (node unknowns, border)
+  Eigen::MatrixXd corner;  ///< (border, border)
   Eigen::VectorXd border_right;
 
   /// Factors and solves; false when the matrix is not positive definite.

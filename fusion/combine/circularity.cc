@@ -58,13 +58,15 @@ Circularity circularity(const NodeVector& node, const NodeMatrix& covariance) {
   }
   for (int i = 0; i < kTerms; ++i) {
     mean(i) = node(places[static_cast<std::size_t>(i)]);
-    for (int j = 0; j < kTerms; ++j) spread(i, j) = covariance(places[static_cast<std::size_t>(i)], places[static_cast<std::size_t>(j)]);
+    for (int j = 0; j < kTerms; ++j)
+      spread(i, j) = covariance(places[static_cast<std::size_t>(i)], places[static_cast<std::size_t>(j)]);
   }
   spread.diagonal().array() += 1e-18;
   const Eigen::Matrix<double, kTerms, kTerms> half = spread.llt().matrixL();
   const Eigen::Matrix<double, kTerms, kDraws> drawn = (half * normal_draws()).colwise() + mean;
   const Eigen::Matrix<double, kDirections, kDraws> widths = width_matrix() * drawn;
-  const Eigen::Array<double, 1, kDraws> circularities = 0.5 * (widths.colwise().maxCoeff() - widths.colwise().minCoeff()).array();
+  const Eigen::Array<double, 1, kDraws> circularities =
+      0.5 * (widths.colwise().maxCoeff() - widths.colwise().minCoeff()).array();
   Circularity result;
   result.value_mm = circularities.mean();
   result.sigma_mm = std::sqrt((circularities - result.value_mm).square().mean());

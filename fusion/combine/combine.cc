@@ -15,7 +15,8 @@ namespace {
 /// Radius just before an end, where its circle is.
 double end_radius(const AxisCurve& axis, std::span<const double> radius_mm, double end_section_mm, bool last) {
   const std::size_t n = radius_mm.size();
-  const auto window = std::clamp<std::size_t>(static_cast<std::size_t>(0.5 * end_section_mm / axis.x_step_mm), 3, n / 2);
+  const auto window =
+      std::clamp<std::size_t>(static_cast<std::size_t>(0.5 * end_section_mm / axis.x_step_mm), 3, n / 2);
   std::vector<double> values(last ? radius_mm.end() - static_cast<std::ptrdiff_t>(window) : radius_mm.begin(),
                              last ? radius_mm.end() : radius_mm.begin() + static_cast<std::ptrdiff_t>(window));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(window / 2), values.end());
@@ -33,13 +34,16 @@ EndPlanes find_ends(std::span<const ObservedForging> observations, std::span<con
   for (std::size_t k = 0; k < observations.size(); ++k) {
     for (const EndReading& reading : observations[k].ends) {
       const CameraShare& share = observations[k].cameras[static_cast<std::size_t>(reading.camera)];
-      const auto met = meet_end_circle(axis, placements[k].point(share.pose.center_world_mm),
-                                       placements[k].R * reading.ray_world, reading.last ? radius_last : radius_first,
-                                       reading.last, reading.last ? length : 0.0);
+      const auto met =
+          meet_end_circle(axis, placements[k].point(share.pose.center_world_mm), placements[k].R * reading.ray_world,
+                          reading.last ? radius_last : radius_first, reading.last, reading.last ? length : 0.0);
       if (!met) continue;
       const Eigen::Vector3d center = axis.at(met->x()).point_mm;
-      points.push_back({.observation = static_cast<int>(k), .last = reading.last, .x_mm = met->x(),
-                        .beside_mm = (*met - center).tail<2>(), .sigma_mm = reading.sigma_mm});
+      points.push_back({.observation = static_cast<int>(k),
+                        .last = reading.last,
+                        .x_mm = met->x(),
+                        .beside_mm = (*met - center).tail<2>(),
+                        .sigma_mm = reading.sigma_mm});
     }
   }
   EndPriors priors;
@@ -65,14 +69,16 @@ std::vector<double> first_radii(const ObservedForging& observed, double step_mm,
   std::vector<std::vector<double>> seen(nodes);
   for (const ObservedSection& section : observed.sections)
     for (const TangentPlane& tangent : section.tangents) {
-      const auto i = static_cast<std::size_t>(std::clamp<long>(std::lround(tangent.s_mm / step_mm), 0, static_cast<long>(nodes) - 1));
+      const auto i = static_cast<std::size_t>(
+          std::clamp<long>(std::lround(tangent.s_mm / step_mm), 0, static_cast<long>(nodes) - 1));
       seen[i].push_back(tangent.offset_mm - tangent.normal_world.dot(section.axis_world_mm));
     }
   std::vector<double> radii(nodes, 0.0);
   double previous = observed.radius_mm;
   for (std::size_t i = 0; i < nodes; ++i) {
     if (!seen[i].empty()) {
-      std::nth_element(seen[i].begin(), seen[i].begin() + static_cast<std::ptrdiff_t>(seen[i].size() / 2), seen[i].end());
+      std::nth_element(seen[i].begin(), seen[i].begin() + static_cast<std::ptrdiff_t>(seen[i].size() / 2),
+                       seen[i].end());
       previous = seen[i][seen[i].size() / 2];
     }
     radii[i] = previous;
@@ -100,7 +106,8 @@ AxisCurve first_axis(const ObservedForging& observed, const Placement& placement
 }
 
 /// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
-void align(const JointEstimate& joint, const EndPlanes& ends, double end_section_mm, int sections, CombinedForging& combined) {
+void align(const JointEstimate& joint, const EndPlanes& ends, double end_section_mm, int sections,
+           CombinedForging& combined) {
   const std::size_t n = joint.nodes.size();
   std::vector<double> x(n);
   std::vector<Eigen::Vector2d> yz(n);
@@ -215,16 +222,19 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
 
   radii.clear();
   for (const NodeVector& node : joint->nodes) radii.push_back(node(kRadius));
-  const double fixed = placements.size() > 1 ? *std::max_element(joint->shift_sigma_mm.begin(), joint->shift_sigma_mm.end()) : 1.0;
+  const double fixed =
+      placements.size() > 1 ? *std::max_element(joint->shift_sigma_mm.begin(), joint->shift_sigma_mm.end()) : 1.0;
   ends = find_ends(observations, joint->placements, joint->axis(), radii, std::max(fixed, 1e-4), forging, config);
-  if (!(ends.last.x_mm - ends.first.x_mm > 0.0)) return job_failed("the ends of the observations do not enclose a forging");
+  if (!(ends.last.x_mm - ends.first.x_mm > 0.0))
+    return job_failed("the ends of the observations do not enclose a forging");
   align(*joint, ends, forging.end_section_mm, config.sections, combined);
   combined.length_sigma_mm = ends.length_sigma_mm();
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const double own = (observations[k].end_world_mm - observations[k].start_world_mm).norm();
     if (std::abs(own - combined.length_mm) > config.max_length_difference_mm)
-      combined.warnings.push_back(fmt::format("observation {}: its own length {:.1f} mm differs from {:.1f} mm of all together",
-                                              k, own, combined.length_mm));
+      combined.warnings.push_back(
+          fmt::format("observation {}: its own length {:.1f} mm differs from {:.1f} mm of all together", k, own,
+                      combined.length_mm));
   }
   return combined;
 }

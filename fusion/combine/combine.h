@@ -14,9 +14,9 @@ struct CombinedSection {
   double s_mm = 0.0;
   Eigen::Vector3d axis_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix2d axis_covariance_mm2 = Eigen::Matrix2d::Zero();  ///< of y, z
-  double diameter_mm = 0.0;    ///< mean over directions
+  double diameter_mm = 0.0;                                       ///< mean over directions
   double diameter_sigma_mm = 0.0;
-  double circularity_mm = 0.0; ///< (largest - smallest width) / 2, [D] 2.1.3
+  double circularity_mm = 0.0;  ///< (largest - smallest width) / 2, [D] 2.1.3
   double circularity_sigma_mm = 0.0;
 };
 

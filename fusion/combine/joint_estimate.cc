@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 
@@ -11,9 +12,9 @@
 namespace imprint {
 namespace {
 
-constexpr int kCameraUnknowns = 2;   // its place across the axis, at both ends
-constexpr int kPlaceUnknowns = 6;    // shift x, y, z and turn about x, y, z of an observation
-constexpr double kFreedom = 4.0;     // of Student's t for the tangents
+constexpr int kCameraUnknowns = 2;  // its place across the axis, at both ends
+constexpr int kPlaceUnknowns = 6;   // shift x, y, z and turn about x, y, z of an observation
+constexpr double kFreedom = 4.0;    // of Student's t for the tangents
 
 /// One camera of one observation.
 struct Viewer {
@@ -36,8 +37,16 @@ struct Row {
   bool used = false;
 };
 
+/// Where a tangent touches a section, and the line it is of the section there.
+struct SectionPoint {
+  double x_mm = 0.0;
+  Eigen::Vector3d normal;
+  double offset_mm = 0.0;
+};
+
 /// A row put into the equations.
 struct Equation {
+  double x_mm = 0.0;
   std::size_t node = 0;
   double share = 0.0;  ///< of the next node
   Eigen::Vector3d normal;
@@ -56,6 +65,7 @@ class JointSolver {
         length_mm_(start.x_step_mm * static_cast<double>(start.yz_mm.size() - 1)),
         shift_sigma_mm_(shift_sigma_mm),
         radius_mm_(median(start_radius_mm)),
+        end_margin_(1.0 + 2.0 * shift_sigma_mm / start.x_step_mm),
         prior_(static_cast<int>(start.yz_mm.size()), start.x_step_mm, radius_mm_, config.out_of_round_share,
                config.out_of_round_length_share * length_mm_),
         system_(0, 0) {
@@ -116,8 +126,11 @@ class JointSolver {
       for (std::size_t c = 0; c < observed.cameras.size(); ++c) {
         const CameraShare& share = observed.cameras[c];
         if (share.excluded) continue;
-        Viewer viewer{.observation = k, .center_world_mm = share.pose.center_world_mm, .pose_covariance = share.pose.covariance,
-                      .R_cam_world = share.pose.R_cam_world, .column = static_cast<int>(viewers_.size()) * kCameraUnknowns};
+        Viewer viewer{.observation = k,
+                      .center_world_mm = share.pose.center_world_mm,
+                      .pose_covariance = share.pose.covariance,
+                      .R_cam_world = share.pose.R_cam_world,
+                      .column = static_cast<int>(viewers_.size()) * kCameraUnknowns};
         if (!viewer.pose_covariance.allFinite()) viewer.pose_covariance.setZero();
         viewer.pose_covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(observed.disagreement_sigma_mm, 2);
         for (const bool upper : {true, false}) {
@@ -125,9 +138,12 @@ class JointSolver {
           for (const ObservedSection& section : observed.sections)
             for (const TangentPlane& tangent : section.tangents)
               if (tangent.camera == static_cast<int>(c) && tangent.upper == upper && tangent.weight > 0.0)
-                rows_.push_back({.viewer = viewers_.size(), .ray_world = tangent.ray_world,
-                                 .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight, .x_mm = tangent.s_mm});
-          std::sort(rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.end(), [](const Row& a, const Row& b) { return a.x_mm < b.x_mm; });
+                rows_.push_back({.viewer = viewers_.size(),
+                                 .ray_world = tangent.ray_world,
+                                 .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight,
+                                 .x_mm = tangent.s_mm});
+          std::sort(rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.end(),
+                    [](const Row& a, const Row& b) { return a.x_mm < b.x_mm; });
           for (std::size_t i = first + 1; i < rows_.size(); ++i) rows_[i].continues = true;
         }
         viewers_.push_back(viewer);
@@ -154,24 +170,75 @@ class JointSolver {
     row.x_mm = contact->x_mm;
     const double position = row.x_mm / step_mm_;
     const auto last = static_cast<double>(nodes_.size() - 1);
-    if (position < -0.25 || position > last + 0.25) return std::nullopt;
+    if (position < end_margin_ || position > last - end_margin_) return std::nullopt;
+    // Sections stand square to the working line, so the one touched is where the contact itself lies, and its normal
+    // has length 1 within it.
+    const double square = contact->normal.tail<2>().norm();
+    SectionPoint met{.x_mm = contact->x_mm + contact->distance_mm * contact->normal.x(),
+                     .normal = contact->normal / square,
+                     .offset_mm = contact->offset_mm / square};
+    const Eigen::Vector3d ray = placement.R * row.ray_world;
+    if (!settle_on_shoulder(curve, center + contact->range_mm * ray, ray, contact->distance_mm, met))
+      return std::nullopt;
     Equation equation;
-    equation.node = static_cast<std::size_t>(std::clamp(std::floor(position), 0.0, last - 1.0));
-    equation.share = std::clamp(position - static_cast<double>(equation.node), 0.0, 1.0);
-    equation.normal = contact->normal;
-    const double theta = std::atan2(contact->normal.z(), contact->normal.y());
+    const double met_position = met.x_mm / step_mm_;
+    equation.x_mm = met.x_mm;
+    equation.node = static_cast<std::size_t>(std::clamp(std::floor(met_position), 0.0, last - 1.0));
+    equation.share = std::clamp(met_position - static_cast<double>(equation.node), 0.0, 1.0);
+    equation.normal = met.normal;
+    equation.value_mm = met.offset_mm - met.normal.x() * met.x_mm;
     NodeVector& g = equation.coefficients;
-    g(kY) = contact->normal.y();
-    g(kZ) = contact->normal.z();
+    g(kY) = met.normal.y();
+    g(kZ) = met.normal.z();
     g(kRadius) = 1.0;
-    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
-      g(cosine_of(order)) = std::cos(order * theta);
-      g(sine_of(order)) = std::sin(order * theta);
-    }
-    equation.value_mm = contact->offset_mm - contact->normal.x() * row.x_mm;
-    const Eigen::Vector3d view = (curve.at(row.x_mm).point_mm - center).normalized();
-    equation.across = contact->normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
+    g.tail<2 * kHarmonics>() = harmonics_at(std::atan2(met.normal.z(), met.normal.y()));
+    const Eigen::Vector3d view = (curve.at(met.x_mm).point_mm - center).normalized();
+    equation.across = met.normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
     return equation;
+  }
+
+  static Eigen::Matrix<double, 2 * kHarmonics, 1> harmonics_at(double theta) {
+    Eigen::Matrix<double, 2 * kHarmonics, 1> values;
+    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
+      values(2 * (order - kFirstHarmonic)) = std::cos(order * theta);
+      values(2 * (order - kFirstHarmonic) + 1) = std::sin(order * theta);
+    }
+    return values;
+  }
+
+  /// Where a ray touches the rod when a thicker part stands close before or behind its closest point to the axis: on
+  /// the shoulder's edge, which then forms the outline. Moves `met` there. False where the two cannot be told apart.
+  bool settle_on_shoulder(const AxisCurve& curve, const Eigen::Vector3d& closest, const Eigen::Vector3d& ray,
+                          double distance_mm, SectionPoint& met) const {
+    constexpr double kShoulder = 0.02;   // of the radius; smaller steps hide nothing that matters
+    constexpr double kTouching = 0.001;  // of the radius
+    constexpr double kDoubtful = 0.01;
+    const double along = ray.x();
+    const double across_over_along = std::sqrt(1.0 - along * along) / std::max(std::abs(along), 1e-6);
+    const double reach = largest_radius_mm_ / across_over_along;
+    const auto last = static_cast<int>(nodes_.size()) - 1;
+    const auto node_at = [&](double x) { return std::clamp(static_cast<int>(std::lround(x / step_mm_)), 0, last); };
+    const double own = nodes_[static_cast<std::size_t>(node_at(met.x_mm))](kRadius);
+    double deepest = -std::numeric_limits<double>::infinity();
+    int shoulder = -1;
+    for (int i = node_at(met.x_mm - reach); i <= node_at(met.x_mm + reach); ++i) {
+      const double radius = nodes_[static_cast<std::size_t>(i)](kRadius);
+      if (radius < (1.0 + kShoulder) * own) continue;
+      const double travel = (i * step_mm_ - met.x_mm) * across_over_along;
+      const double depth = radius - std::hypot(distance_mm, travel);
+      if (depth <= deepest) continue;
+      deepest = depth;
+      shoulder = i;
+    }
+    if (shoulder < 0 || deepest < -kDoubtful * own) return true;
+    if (deepest < -kTouching * own) return false;
+    met.x_mm = shoulder * step_mm_;
+    const Eigen::Vector3d point = closest + (met.x_mm - closest.x()) / ray.x() * ray;
+    Eigen::Vector3d out = point - curve.at(met.x_mm).point_mm;
+    out.x() = 0.0;
+    met.normal = out.normalized();
+    met.offset_mm = met.normal.dot(point);
+    return true;
   }
 
   /// Columns of the observation's place: how the model at this tangent moves with it.
@@ -225,13 +292,15 @@ class JointSolver {
   }
 
   bool iterate(bool final) {
-    const int border = static_cast<int>(viewers_.size()) * kCameraUnknowns +
-                       static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
+    const int border =
+        static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
     system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
     prior_.add_to(system_);
     add_camera_priors();
     add_place_priors();
     const AxisCurve curve = axis();
+    largest_radius_mm_ = 0.0;
+    for (const NodeVector& node : nodes_) largest_radius_mm_ = std::max(largest_radius_mm_, node(kRadius));
     std::vector<std::optional<Equation>> equations;
     equations.reserve(rows_.size());
     for (Row& row : rows_) {
@@ -248,12 +317,18 @@ class JointSolver {
     if (final) return true;
     learn_noise(equations);
     prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()));
+      fprintf(stderr, "noise %.4f corr %.3f tau2 %.4f tau3 %.4f tau4 %.4f len %.1f bend %.3g rad %.3g\n",
+              noise_scale_ * std::sqrt(median_variance()), correlation_, prior_.harmonic_sigma_mm(2),
+              prior_.harmonic_sigma_mm(3), prior_.harmonic_sigma_mm(4), prior_.harmonic_length_mm(),
+              prior_.bend_density(), prior_.radius_density());
     return true;
   }
 
   void add_equation(const Row& row, const Equation& equation) {
-    const double w = row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_);
     const std::size_t i = equation.node;
+    // On a shoulder half a step along the axis is worth more than the edge.
+    const double rise = nodes_[i + 1](kRadius) - nodes_[i](kRadius);
+    const double w = row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_ + 0.25 * rise * rise);
     const double next = equation.share;
     const double here = 1.0 - next;
     const NodeVector& g = equation.coefficients;
@@ -265,12 +340,13 @@ class JointSolver {
     system_.right[i + 1] += w * next * equation.value_mm * g;
 
     const Viewer& viewer = viewers_[row.viewer];
-    const double along = std::clamp(row.x_mm / length_mm_, 0.0, 1.0);
+    const double along = std::clamp(equation.x_mm / length_mm_, 0.0, 1.0);
     std::array<int, kCameraUnknowns + kPlaceUnknowns> columns{viewer.column, viewer.column + 1};
-    std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.across * (1.0 - along), equation.across * along};
+    std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.across * (1.0 - along),
+                                                                 equation.across * along};
     std::size_t count = kCameraUnknowns;
     if (viewer.observation > 0) {
-      const Vector6d effect = place_effect(equation, row.x_mm);
+      const Vector6d effect = place_effect(equation, equation.x_mm);
       for (int j = 0; j < kPlaceUnknowns; ++j) {
         columns[count] = place_column(viewer.observation) + j;
         effects[count++] = effect(j);
@@ -293,12 +369,15 @@ class JointSolver {
       if (!row.used) continue;
       const Equation& equation = *equations[r];
       const Viewer& viewer = viewers_[row.viewer];
-      const NodeVector node = (1.0 - equation.share) * nodes_[equation.node] + equation.share * nodes_[equation.node + 1];
-      const double along = std::clamp(row.x_mm / length_mm_, 0.0, 1.0);
-      double model = equation.coefficients.dot(node) +
-                     equation.across * ((1.0 - along) * camera_solution_(viewer.column) + along * camera_solution_(viewer.column + 1));
+      const NodeVector node =
+          (1.0 - equation.share) * nodes_[equation.node] + equation.share * nodes_[equation.node + 1];
+      const double along = std::clamp(equation.x_mm / length_mm_, 0.0, 1.0);
+      double model =
+          equation.coefficients.dot(node) + equation.across * ((1.0 - along) * camera_solution_(viewer.column) +
+                                                               along * camera_solution_(viewer.column + 1));
       if (viewer.observation > 0)
-        model += place_effect(equation, row.x_mm).dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
+        model += place_effect(equation, equation.x_mm)
+                     .dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
       row.residual_mm = equation.value_mm - model;
     }
   }
@@ -330,17 +409,21 @@ class JointSolver {
                             2.0 * here * e.share * g.dot(with_next_[e.node] * g);
       const double expected = row.residual_mm * row.residual_mm + fitted;
       const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
+      // A tangent that the estimate bends itself to says less of the scatter.
+      const double open = std::min(1.0, row.trust * fitted / (variance * correlation_));
       row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance);
-      sum += row.trust * expected / row.variance_mm2;
-      count += 1.0;
+      sum += row.trust * row.residual_mm * row.residual_mm / row.variance_mm2;
+      count += 1.0 - open;
       if (row.continues && r > 0 && rows_[r - 1].used) {
-        const double here_trust = std::sqrt(row.trust * rows_[r - 1].trust / (row.variance_mm2 * rows_[r - 1].variance_mm2));
+        const double here_trust =
+            std::sqrt(row.trust * rows_[r - 1].trust / (row.variance_mm2 * rows_[r - 1].variance_mm2));
         neighbours += here_trust * row.residual_mm * rows_[r - 1].residual_mm;
         squares += 0.5 * (row.trust * row.residual_mm * row.residual_mm / row.variance_mm2 +
-                          rows_[r - 1].trust * rows_[r - 1].residual_mm * rows_[r - 1].residual_mm / rows_[r - 1].variance_mm2);
+                          rows_[r - 1].trust * rows_[r - 1].residual_mm * rows_[r - 1].residual_mm /
+                              rows_[r - 1].variance_mm2);
       }
     }
-    if (count < 1.0) return;
+    if (count < 0.05 * static_cast<double>(rows_.size())) return;
     // Never below a fifth of the stated sigma: exact input must not make the equations singular.
     noise_scale_ = std::max(0.2, std::sqrt(sum / count));
     const double correlation = squares > 0.0 ? std::clamp(neighbours / squares, 0.0, 0.9) : 0.0;
@@ -353,6 +436,8 @@ class JointSolver {
   double length_mm_;
   double shift_sigma_mm_;
   double radius_mm_;
+  double largest_radius_mm_ = 0.0;
+  double end_margin_;  ///< nodes next to an end whose tangents may belong to the end circle instead
   SectionPrior prior_;
   BorderedSystem system_;
   std::vector<Viewer> viewers_;

@@ -17,11 +17,11 @@ namespace imprint {
 struct JointEstimate {
   double step_mm = 1.0;
   std::vector<NodeVector> nodes;
-  std::vector<NodeMatrix> covariance;     ///< of each node, everything included
-  BorderedSystem system{0, 0};            ///< solved
-  std::vector<Placement> placements;      ///< from the world of each observation to the forging
-  std::vector<double> shift_sigma_mm;     ///< of each observation along x
-  double scatter_share = 1.0;             ///< scatter of the tangents about the model, in units of their stated sigma
+  std::vector<NodeMatrix> covariance;  ///< of each node, everything included
+  BorderedSystem system{0, 0};         ///< solved
+  std::vector<Placement> placements;   ///< from the world of each observation to the forging
+  std::vector<double> shift_sigma_mm;  ///< of each observation along x
+  double scatter_share = 1.0;          ///< scatter of the tangents about the model, in units of their stated sigma
 
   [[nodiscard]] AxisCurve axis() const;
 };

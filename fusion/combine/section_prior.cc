@@ -16,9 +16,20 @@ Eigen::Matrix2d bend_precision(double h) {
   return covariance.inverse();
 }
 
+/// Evidence of a variance: squared estimates (in its unit), how many there are, and how many of them the data leave
+/// open. An open one says nothing of the variance; counting only the others converges in few rounds where plain
+/// expectation maximisation creeps.
+struct Amount {
+  double squares = 0.0;
+  double open = 0.0;
+  double count = 0.0;
+  [[nodiscard]] double variance() const { return squares / std::max(count - open, 0.01 * count); }
+};
+
 }  // namespace
 
-SectionPrior::SectionPrior(int nodes, double step_mm, double radius_mm, double out_of_round_share, double out_of_round_length_mm)
+SectionPrior::SectionPrior(int nodes, double step_mm, double radius_mm, double out_of_round_share,
+                           double out_of_round_length_mm)
     : step_mm_(step_mm),
       radius_mm_(radius_mm),
       length_mm_(step_mm * (nodes - 1)),
@@ -75,43 +86,71 @@ void SectionPrior::add_to(BorderedSystem& system) const {
 
 void SectionPrior::learn(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
                          std::span<const NodeMatrix> with_next, int observations) {
-  learn_harmonics(nodes, own, with_next, observations);
+  learn_harmonics(nodes, own, observations);
   learn_axis(nodes, own, with_next);
   learn_radius(nodes, own, with_next);
 }
 
 void SectionPrior::learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                                   std::span<const NodeMatrix> with_next, int observations) {
-  std::array<double, kHarmonics> power{};
-  double relative = 0.0;
-  double together = 0.0;
+                                   int observations) {
+  const std::size_t n = nodes.size();
+  std::array<Amount, kHarmonics> amounts{};
   for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
-    const double sigma = harmonic_sigma_mm(order);
-    double sum = 0.0;
+    const double variance = harmonic_sigma_mm(order) * harmonic_sigma_mm(order);
+    Amount& amount = amounts[static_cast<std::size_t>(order - kFirstHarmonic)];
     for (const int place : {cosine_of(order), sine_of(order)}) {
-      for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const double squared = nodes[i](place) * nodes[i](place) + own[i](place, place);
-        sum += squared;
-        if (i + 1 == nodes.size()) continue;
-        together += (nodes[i](place) * nodes[i + 1](place) + with_next[i](place, place)) / (sigma * sigma);
-        relative += 0.5 * (squared + nodes[i + 1](place) * nodes[i + 1](place) + own[i + 1](place, place)) / (sigma * sigma);
+      for (std::size_t i = 0; i < n; ++i) {
+        const double value = nodes[i](place);
+        amount.squares += value * value;
+        amount.open += own[i](place, place) / variance;
+        amount.count += 1.0;
       }
     }
-    power[static_cast<std::size_t>(order - kFirstHarmonic)] = sum / (2.0 * static_cast<double>(nodes.size()));
   }
-  double size2 = 0.0;
-  for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order)
-    size2 += power[static_cast<std::size_t>(order - kFirstHarmonic)] / (spectrum(order) * spectrum(order)) / kHarmonics;
+  Amount all;
+  for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
+    const Amount& amount = amounts[static_cast<std::size_t>(order - kFirstHarmonic)];
+    all.squares += amount.squares / (spectrum(order) * spectrum(order));
+    all.open += amount.open;
+    all.count += amount.count;
+  }
   // The more observations, the more each harmonic speaks for itself.
   const double own_share = std::clamp((observations - 2) / 3.0, 0.0, 0.9);
   for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
     const auto k = static_cast<std::size_t>(order - kFirstHarmonic);
-    const double pooled = size2 * spectrum(order) * spectrum(order);
-    harmonic_sigma_mm_[k] = std::max(1e-5 * radius_mm_, std::sqrt(own_share * power[k] + (1.0 - own_share) * pooled));
+    const double pooled = all.variance() * spectrum(order) * spectrum(order);
+    harmonic_sigma_mm_[k] =
+        std::max(1e-5 * radius_mm_, std::sqrt(own_share * amounts[k].variance() + (1.0 - own_share) * pooled));
   }
-  const double keep = std::clamp(together / std::max(relative, 1e-300), std::exp(-step_mm_ / (2.0 * step_mm_)),
-                                 std::exp(-step_mm_ / (2.0 * length_mm_)));
-  harmonic_length_mm_ = -step_mm_ / std::log(keep);
+  harmonic_length_mm_ = shape_length_mm(nodes);
+}
+
+double SectionPrior::shape_length_mm(std::span<const NodeVector> nodes) const {
+  // Read where a good part of the likeness is lost: from one node to the next a smooth forging changes so little
+  // that it would seem never to change.
+  constexpr double kLikeness = 0.6;
+  const std::size_t n = nodes.size();
+  const double longest = 0.25 * length_mm_;
+  for (std::size_t lag = 1; lag < n / 2; lag += 1 + lag / 4) {
+    double together = 0.0;
+    double alone = 0.0;
+    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
+      const double precision = 1.0 / (harmonic_sigma_mm(order) * harmonic_sigma_mm(order));
+      for (const int place : {cosine_of(order), sine_of(order)}) {
+        for (std::size_t i = 0; i + lag < n; ++i) {
+          const double value = nodes[i](place);
+          const double later = nodes[i + lag](place);
+          together += value * later * precision;
+          alone += 0.5 * (value * value + later * later) * precision;
+        }
+      }
+    }
+    const double likeness = together / std::max(alone, 1e-300);
+    if (likeness < kLikeness)
+      return std::clamp(-step_mm_ * static_cast<double>(lag) / std::log(std::max(likeness, 0.1)), 3.0 * step_mm_,
+                        longest);
+  }
+  return longest;
 }
 
 void SectionPrior::learn_axis(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
@@ -119,20 +158,21 @@ void SectionPrior::learn_axis(std::span<const NodeVector> nodes, std::span<const
   const Eigen::Matrix2d precision = bend_precision(step_mm_);
   Eigen::Matrix2d advance;
   advance << 1.0, step_mm_, 0.0, 1.0;
-  double sum = 0.0;
+  Amount amount;
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
     for (const int place : {kY, kZ}) {
       const Eigen::Vector2d gain = nodes[i + 1].segment<2>(place) - advance * nodes[i].segment<2>(place);
       const Eigen::Matrix2d cross = with_next[i].block<2, 2>(place, place);
-      const Eigen::Matrix2d spread = gain * gain.transpose() + own[i + 1].block<2, 2>(place, place) +
-                                     advance * own[i].block<2, 2>(place, place) * advance.transpose() - advance * cross -
-                                     cross.transpose() * advance.transpose();
-      sum += (precision * spread).trace();
+      const Eigen::Matrix2d spread = own[i + 1].block<2, 2>(place, place) +
+                                     advance * own[i].block<2, 2>(place, place) * advance.transpose() -
+                                     advance * cross - cross.transpose() * advance.transpose();
+      amount.squares += gain.dot(precision * gain);
+      amount.open += (precision * spread).trace() / bend_density_;
+      amount.count += 2.0;
     }
   }
-  const double learnt = sum / (4.0 * static_cast<double>(nodes.size() - 1));
   // Between a rod straight to 1e-4 of its length and one bent by a fifth of it.
-  bend_density_ = std::clamp(learnt, 1e-8 / length_mm_, 0.04 / length_mm_);
+  bend_density_ = std::clamp(amount.variance(), 1e-8 / length_mm_, 0.04 / length_mm_);
 }
 
 void SectionPrior::learn_radius(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
@@ -141,19 +181,23 @@ void SectionPrior::learn_radius(std::span<const NodeVector> nodes, std::span<con
   constexpr double kFreedom = 1.0;
   const std::size_t steps = nodes.size() - 1;
   std::vector<double> squared(steps);
+  std::vector<double> spread(steps);
   for (std::size_t i = 0; i < steps; ++i) {
     const double gain = nodes[i + 1](kRadius) - nodes[i](kRadius);
-    squared[i] = gain * gain + own[i](kRadius, kRadius) + own[i + 1](kRadius, kRadius) - 2.0 * with_next[i](kRadius, kRadius);
+    squared[i] = gain * gain;
+    spread[i] = own[i](kRadius, kRadius) + own[i + 1](kRadius, kRadius) - 2.0 * with_next[i](kRadius, kRadius);
   }
   for (int round = 0; round < 3; ++round) {
     const double variance = radius_density_ * step_mm_;
-    double sum = 0.0;
+    Amount amount;
     for (std::size_t i = 0; i < steps; ++i) {
-      radius_trust_[i] = (kFreedom + 1.0) / (kFreedom + squared[i] / variance);
-      sum += radius_trust_[i] * squared[i];
+      radius_trust_[i] = (kFreedom + 1.0) / (kFreedom + (squared[i] + spread[i]) / variance);
+      amount.squares += radius_trust_[i] * squared[i];
+      amount.open += radius_trust_[i] * std::min(spread[i] / variance, 1.0);
+      amount.count += radius_trust_[i];
     }
     const double floor = 1e-8 * radius_mm_ * radius_mm_ / length_mm_;
-    radius_density_ = std::max(floor, sum / static_cast<double>(steps) / step_mm_);
+    radius_density_ = std::max(floor, amount.variance() / step_mm_);
   }
 }
 

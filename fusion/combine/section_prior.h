@@ -34,25 +34,29 @@ class SectionPrior {
   void learn(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, std::span<const NodeMatrix> with_next,
              int observations);
 
-  [[nodiscard]] double harmonic_sigma_mm(int k) const { return harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)]; }
+  [[nodiscard]] double harmonic_sigma_mm(int k) const {
+    return harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)];
+  }
   [[nodiscard]] double harmonic_length_mm() const { return harmonic_length_mm_; }
   [[nodiscard]] double bend_density() const { return bend_density_; }
   [[nodiscard]] double radius_density() const { return radius_density_; }
 
  private:
-  void learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                       std::span<const NodeMatrix> with_next, int observations);
-  void learn_axis(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, std::span<const NodeMatrix> with_next);
-  void learn_radius(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, std::span<const NodeMatrix> with_next);
+  void learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, int observations);
+  [[nodiscard]] double shape_length_mm(std::span<const NodeVector> nodes) const;
+  void learn_axis(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
+                  std::span<const NodeMatrix> with_next);
+  void learn_radius(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
+                    std::span<const NodeMatrix> with_next);
 
   double step_mm_;
   double radius_mm_;
   double length_mm_;
   std::array<double, kHarmonics> harmonic_sigma_mm_{};
   double harmonic_length_mm_;
-  double bend_density_;                ///< variance of the slope gained per mm
-  double radius_density_;              ///< mm^2 of variance of the radius per mm
-  std::vector<double> radius_trust_;   ///< of each step between nodes: near 0 at a shoulder
+  double bend_density_;               ///< variance of the slope gained per mm
+  double radius_density_;             ///< mm^2 of variance of the radius per mm
+  std::vector<double> radius_trust_;  ///< of each step between nodes: near 0 at a shoulder
 };
 
 }  // namespace imprint

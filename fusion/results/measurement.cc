@@ -14,7 +14,8 @@ constexpr double kCi95 = 1.959964;  // standard deviations of a normal value
 /// Radius of the circle about the measured axis point that holds the true one with 95 %. Between a line (1.960 sigma)
 /// and a round cloud (2.448 sigma) the fit is good to 0.5 %.
 double axis_ci95_mm(const Eigen::Matrix2d& covariance) {
-  const Eigen::Vector2d variances = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector2d variances =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
   const double larger = std::sqrt(std::max(variances(1), 0.0));
   const double smaller = std::sqrt(std::max(variances(0), 0.0));
   if (!(larger > 0.0)) return 0.0;
@@ -141,7 +142,8 @@ nlohmann::json to_json(const Measurement& measurement) {
   for (const Measurement::Observation& observation : measurement.observations) {
     nlohmann::json cameras = nlohmann::json::array();
     for (const CameraShare& camera : observation.cameras) cameras.push_back(camera_to_json(camera));
-    json["observations"].push_back({{"index", observation.index}, {"rotation_deg", observation.rotation_deg}, {"cameras", cameras}});
+    json["observations"].push_back(
+        {{"index", observation.index}, {"rotation_deg", observation.rotation_deg}, {"cameras", cameras}});
   }
   json["warnings"] = measurement.warnings;
   return json;
@@ -161,7 +163,8 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     measurement.max_deflection_direction_deg = json.at("max_deflection_direction_deg").get<double>();
     measurement.R_forging_world = matrix_from_json(json.at("alignment").at("R_forging_world"));
     measurement.origin_world_mm = vector_from_json(json.at("alignment").at("origin_world_mm"));
-    for (const nlohmann::json& section : json.at("sections")) measurement.sections.push_back(section_from_json(section));
+    for (const nlohmann::json& section : json.at("sections"))
+      measurement.sections.push_back(section_from_json(section));
     for (const nlohmann::json& from : json.at("observations")) {
       Measurement::Observation observation;
       observation.index = from.at("index").get<int>();

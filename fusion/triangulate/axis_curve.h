@@ -14,17 +14,15 @@ struct AxisCurve {
   Eigen::Matrix3d R_line = Eigen::Matrix3d::Identity();  ///< rows: the line's direction, y, z
   double x_first_mm = 0.0;
   double x_step_mm = 1.0;
-  std::vector<Eigen::Vector2d> yz_mm;     ///< one a sample
-  std::vector<Eigen::Vector2d> slope;     ///< d(y, z)/dx, one a sample
+  std::vector<Eigen::Vector2d> yz_mm;  ///< one a sample
+  std::vector<Eigen::Vector2d> slope;  ///< d(y, z)/dx, one a sample
 
   struct Place {
-    Eigen::Vector3d point_mm;      ///< on the axis
-    Eigen::Vector3d direction;     ///< of the axis there, length 1
+    Eigen::Vector3d point_mm;   ///< on the axis
+    Eigen::Vector3d direction;  ///< of the axis there, length 1
   };
   [[nodiscard]] Place at(double x_mm) const;
-  [[nodiscard]] double x_of(const Eigen::Vector3d& point_mm) const {
-    return R_line.row(0).dot(point_mm - origin_mm);
-  }
+  [[nodiscard]] double x_of(const Eigen::Vector3d& point_mm) const { return R_line.row(0).dot(point_mm - origin_mm); }
   /// Fills `slope` by central differences of `yz_mm`.
   void set_slopes();
 };
@@ -35,11 +33,11 @@ AxisCurve straight_axis(const Eigen::Vector3d& origin_mm, const Eigen::Vector3d&
 
 /// Where a viewing ray touches a bar around `axis`, and the viewing plane there.
 struct RimContact {
-  double x_mm = 0.0;        ///< along the axis curve's line
-  Eigen::Vector3d normal;   ///< of the viewing plane, length 1, out of the bar
-  double offset_mm = 0.0;   ///< normal . X on the plane
-  double distance_mm = 0.0; ///< of the plane from the axis point at x
-  double range_mm = 0.0;    ///< from the camera
+  double x_mm = 0.0;         ///< along the axis curve's line
+  Eigen::Vector3d normal;    ///< of the viewing plane, length 1, out of the bar
+  double offset_mm = 0.0;    ///< normal . X on the plane
+  double distance_mm = 0.0;  ///< of the plane from the axis point at x
+  double range_mm = 0.0;     ///< from the camera
 };
 
 /// The viewing plane holds the ray and the axis direction at the contact: exact where the bar is a cylinder,

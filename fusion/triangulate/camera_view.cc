@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <fmt/format.h>
+#include <Eigen/LU>
 
 namespace imprint {
 namespace {
@@ -48,7 +49,8 @@ EndRay end_ray(const Imprint& imprint, const ImprintEnd& end) {
 }
 
 std::size_t usable(const std::vector<CurveRay>& rays) {
-  return static_cast<std::size_t>(std::count_if(rays.begin(), rays.end(), [](const CurveRay& r) { return r.weight > 0.0; }));
+  return static_cast<std::size_t>(
+      std::count_if(rays.begin(), rays.end(), [](const CurveRay& r) { return r.weight > 0.0; }));
 }
 
 }  // namespace

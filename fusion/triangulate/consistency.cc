@@ -6,8 +6,8 @@
 #include <limits>
 #include <optional>
 
-#include <Eigen/Dense>
 #include <fmt/format.h>
+#include <Eigen/Dense>
 
 #include "fusion/triangulate/first_axis.h"
 #include "fusion/triangulate/section_fit.h"
@@ -28,9 +28,9 @@ double median(std::vector<double>& values) {
 /// What one camera says of the bar about a common axis, in each third of its length.
 struct Testimony {
   std::array<double, kThirds> half_width_mm{};
-  std::array<double, kThirds> across_mm{};          ///< place of the axis along `across`
-  std::array<Eigen::Vector2d, kThirds> across{};    ///< direction in y, z
-  std::optional<double> first_mm, last_mm;          ///< ends along the axis
+  std::array<double, kThirds> across_mm{};        ///< place of the axis along `across`
+  std::array<Eigen::Vector2d, kThirds> across{};  ///< direction in y, z
+  std::optional<double> first_mm, last_mm;        ///< ends along the axis
 };
 
 Testimony testimony(const CameraView& view, const AxisCurve& axis, double radius_mm) {
@@ -134,14 +134,16 @@ struct Agreement {
   double misfit_mm = std::numeric_limits<double>::infinity();         ///< of widths, places and ends
 };
 
-Result<Agreement> agreement_of(std::vector<CameraView> views, const ForgingSpec& forging, const TriangulateConfig& config) {
+Result<Agreement> agreement_of(std::vector<CameraView> views, const ForgingSpec& forging,
+                               const TriangulateConfig& config) {
   const double limit = config.max_ray_distance_share * forging.diameter_max_mm;
   const std::vector<Eigen::Vector3d> points = triangulate_axis_points(views, limit);
   auto line = line_through(points, forging.axis_direction_world, 50);
   if (!line) return pass_on(line.error());
   Agreement agreement{.views = std::move(views), .axis = *line};
   std::vector<double> radii;
-  for (const RimTangent& tangent : rim_tangents(agreement.views, agreement.axis)) radii.push_back(tangent.contact.distance_mm);
+  for (const RimTangent& tangent : rim_tangents(agreement.views, agreement.axis))
+    radii.push_back(tangent.contact.distance_mm);
   const double radius = median(radii);
   if (!(radius > 0.0)) return job_failed("the rims of the cameras do not enclose the axis their middles form");
   std::vector<Testimony> all;
@@ -154,7 +156,8 @@ Result<Agreement> agreement_of(std::vector<CameraView> views, const ForgingSpec&
 /// The widest angle between two cameras as seen from the axis, folded to 0..90 degrees: a camera on the opposite side
 /// sees the same rims.
 double widest_angle_deg(std::span<const CameraView> views, const AxisCurve& axis) {
-  const AxisCurve::Place middle = axis.at(axis.x_first_mm + 0.5 * axis.x_step_mm * static_cast<double>(axis.yz_mm.size() - 1));
+  const AxisCurve::Place middle =
+      axis.at(axis.x_first_mm + 0.5 * axis.x_step_mm * static_cast<double>(axis.yz_mm.size() - 1));
   double widest = 0.0;
   const auto side = [&](const CameraView& view) {
     const Eigen::Vector3d d = view.pose.center_world_mm - middle.point_mm;
@@ -210,8 +213,7 @@ std::optional<double> end_position(const CameraView& view, const EndRay& end, co
 Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<const std::string> ids,
                                      const ForgingSpec& forging, const TriangulateConfig& config) {
   AgreeingViews result;
-  if (views.size() < 2)
-    return job_failed("{} of {} cameras can be used, at least 2 needed", views.size(), ids.size());
+  if (views.size() < 2) return job_failed("{} of {} cameras can be used, at least 2 needed", views.size(), ids.size());
   const double limit = config.max_disagreement_share * forging.diameter_max_mm;
   Result<Agreement> best = agreement_of(views, forging, config);
   while (views.size() > 2 && (!best || best->contradiction_mm > limit)) {
@@ -225,7 +227,8 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
       trials.emplace_back(std::move(*trial), views[drop].camera);
     }
     if (trials.empty()) break;
-    std::sort(trials.begin(), trials.end(), [](const auto& a, const auto& b) { return a.first.misfit_mm < b.first.misfit_mm; });
+    std::sort(trials.begin(), trials.end(),
+              [](const auto& a, const auto& b) { return a.first.misfit_mm < b.first.misfit_mm; });
     const Agreement& agreed = trials.front().first;
     const double next = trials.size() > 1 ? trials[1].first.misfit_mm : std::numeric_limits<double>::infinity();
     if (best && !(agreed.misfit_mm < limit && agreed.misfit_mm < 0.5 * next)) {
@@ -233,8 +236,9 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
       break;
     }
     const std::string by = best ? fmt::format(" by {:.1f} mm (limit {:.1f} mm)", best->contradiction_mm, limit) : "";
-    result.excluded.emplace_back(trials.front().second,
-                                 fmt::format("it contradicts {}{}; check its pose and its imprint", names(agreed.views, ids), by));
+    result.excluded.emplace_back(
+        trials.front().second,
+        fmt::format("it contradicts {}{}; check its pose and its imprint", names(agreed.views, ids), by));
     best = agreed;
     views = best->views;
   }
@@ -242,8 +246,10 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
   if (best->views.size() == 2 && best->contradiction_mm > limit) result.disagreement_mm = best->contradiction_mm;
   const double angle = widest_angle_deg(best->views, best->axis);
   if (angle < config.min_view_angle_deg)
-    return job_failed("cameras {} look in nearly the same direction: {:.1f} deg apart as seen from the forging, at least {:.0f} deg needed",
-                      names(best->views, ids), angle, config.min_view_angle_deg);
+    return job_failed(
+        "cameras {} look in nearly the same direction: {:.1f} deg apart as seen from the forging, at least {:.0f} deg "
+        "needed",
+        names(best->views, ids), angle, config.min_view_angle_deg);
   result.views = std::move(best->views);
   result.axis = std::move(best->axis);
   return result;

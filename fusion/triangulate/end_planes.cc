@@ -44,7 +44,8 @@ EndPlanes fit_end_planes(std::span<const EndPoint> points, int observations, con
     Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
     const double tilt_information = 1.0 / (priors.tilt_sigma_rad * priors.tilt_sigma_rad);
     for (const int tilt : {1, 2, 4, 5}) normal(tilt, tilt) += tilt_information;
-    for (int k = kFaceUnknowns; k < unknowns; ++k) normal(k, k) += 1.0 / (priors.shift_sigma_mm * priors.shift_sigma_mm);
+    for (int k = kFaceUnknowns; k < unknowns; ++k)
+      normal(k, k) += 1.0 / (priors.shift_sigma_mm * priors.shift_sigma_mm);
     // An end that nobody read stays where it was put, without a say.
     normal(0, 0) += 1e-12;
     normal(3, 3) += 1e-12;

@@ -100,7 +100,8 @@ std::vector<Eigen::Vector3d> triangulate_axis_points(std::span<const CameraView>
 Result<AxisCurve> line_through(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& axis_direction,
                                int samples) {
   if (points.size() < 10)
-    return job_failed("the axis imprints of the cameras meet in {} points, at least 10 needed: check the poses", points.size());
+    return job_failed("the axis imprints of the cameras meet in {} points, at least 10 needed: check the poses",
+                      points.size());
   std::vector<double> weight(points.size(), 1.0);
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = axis_direction;
@@ -122,8 +123,7 @@ Result<AxisCurve> line_through(std::span<const Eigen::Vector3d> points, const Ei
     if (solver.info() != Eigen::Success || !(solver.eigenvalues()(2) > 4.0 * solver.eigenvalues()(1)))
       return job_failed("the axis points of the cameras form no line: check the poses and the imprints");
     direction = solver.eigenvectors().col(2);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      distance[i] = (points[i] - center).cross(direction).norm();
+    for (std::size_t i = 0; i < points.size(); ++i) distance[i] = (points[i] - center).cross(direction).norm();
     std::vector<double> sorted = distance;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
     const double scale = std::max(2.0 * sorted[sorted.size() / 2], 1e-6);

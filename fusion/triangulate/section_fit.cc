@@ -113,7 +113,8 @@ AxisCurve moved_axis(const AxisCurve& axis, std::span<const FittedCircle> circle
     // A sample without a circle moves with its nearest neighbour that has one.
     while (next + 1 < fitted.size() && fitted[next + 1] <= i) ++next;
     std::size_t source = fitted[next];
-    if (next + 1 < fitted.size() && fitted[next + 1] - i < (i > source ? i - source : source - i)) source = fitted[next + 1];
+    if (next + 1 < fitted.size() && fitted[next + 1] - i < (i > source ? i - source : source - i))
+      source = fitted[next + 1];
     y[i] = axis.yz_mm[i].x() + circles[source].shift_mm.x();
     z[i] = axis.yz_mm[i].y() + circles[source].shift_mm.y();
     weight[i] = circles[i].fitted() ? 1.0 : 1e-3;

@@ -39,7 +39,21 @@ double median_radius(std::span<const FittedCircle> circles, std::size_t first, s
   return radii[radii.size() / 2];
 }
 
-/// `axis` over exactly the stretch on which its cameras' rims touch, with `samples` samples.
+/// `axis` sampled anew over [low, high].
+AxisCurve over(const AxisCurve& axis, double low_mm, double high_mm, int samples) {
+  AxisCurve stretched = axis;
+  stretched.x_first_mm = low_mm;
+  stretched.x_step_mm = (high_mm - low_mm) / (samples - 1);
+  stretched.yz_mm.clear();
+  for (int i = 0; i < samples; ++i) {
+    const Eigen::Vector3d p = axis.at(low_mm + i * stretched.x_step_mm).point_mm - axis.origin_mm;
+    stretched.yz_mm.emplace_back((axis.R_line * p).tail<2>());
+  }
+  stretched.set_slopes();
+  return stretched;
+}
+
+/// `axis` over exactly the stretch on which the rims touch.
 AxisCurve over_rims(const AxisCurve& axis, std::span<const RimTangent> tangents, int samples) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -47,16 +61,7 @@ AxisCurve over_rims(const AxisCurve& axis, std::span<const RimTangent> tangents,
     low = std::min(low, tangent.contact.x_mm);
     high = std::max(high, tangent.contact.x_mm);
   }
-  AxisCurve stretched = axis;
-  stretched.x_first_mm = low;
-  stretched.x_step_mm = (high - low) / (samples - 1);
-  stretched.yz_mm.clear();
-  for (int i = 0; i < samples; ++i) {
-    const Eigen::Vector3d p = axis.at(low + i * stretched.x_step_mm).point_mm - axis.origin_mm;
-    stretched.yz_mm.emplace_back((axis.R_line * p).tail<2>());
-  }
-  stretched.set_slopes();
-  return stretched;
+  return over(axis, low, high, samples);
 }
 
 struct FoundEnds {
@@ -70,12 +75,14 @@ FoundEnds find_ends(std::span<const CameraView> views, const AxisCurve& axis, st
   FoundEnds found;
   std::vector<EndPoint> points;
   const auto samples = circles.size();
-  const auto window = std::clamp<std::size_t>(static_cast<std::size_t>(end_section_mm / axis.x_step_mm), 5, samples / 2);
+  const auto window =
+      std::clamp<std::size_t>(static_cast<std::size_t>(end_section_mm / axis.x_step_mm), 5, samples / 2);
   for (const CameraView& view : views) {
     const bool along = runs_along(view, axis);
     for (const bool last : {false, true}) {
       const EndRay& end = last == along ? view.end : view.start;
-      const double radius = last ? median_radius(circles, samples - window, samples) : median_radius(circles, 0, window);
+      const double radius =
+          last ? median_radius(circles, samples - window, samples) : median_radius(circles, 0, window);
       Eigen::Vector3d met;
       const auto x = end_position(view, end, axis, radius, last, &met);
       if (!x) continue;
@@ -83,10 +90,12 @@ FoundEnds find_ends(std::span<const CameraView> views, const AxisCurve& axis, st
       const double along_ray = end.direction_world.dot(axis.at(*x).direction);
       const double across = std::sqrt(std::max(1e-3, 1.0 - along_ray * along_ray));
       // Seen aslant, an out-of-round rim (1 % of the radius) shifts the reading along the axis.
-      const double sigma = std::hypot(end.sigma_px * range / view.focal_length_px / across, 0.01 * radius * along_ray / across);
+      const double sigma =
+          std::hypot(end.sigma_px * range / view.focal_length_px / across, 0.01 * radius * along_ray / across);
       const Eigen::Vector3d beside = axis.R_line * (met - axis.at(*x).point_mm);
       points.push_back({.observation = 0, .last = last, .x_mm = *x, .beside_mm = beside.tail<2>(), .sigma_mm = sigma});
-      found.readings.push_back({.camera = view.camera, .last = last, .ray_world = end.direction_world, .sigma_mm = sigma});
+      found.readings.push_back(
+          {.camera = view.camera, .last = last, .ray_world = end.direction_world, .sigma_mm = sigma});
     }
   }
   EndPriors priors;
@@ -143,7 +152,8 @@ std::vector<ObservedSection> sections_of(const AxisCurve& axis, std::span<const 
 
 Result<void> TriangulateConfig::validate() const {
   if (sections < 10) return invalid_input("triangulate.sections: at least 10 expected, found {}", sections);
-  if (!(edge_sigma_px > 0.0)) return invalid_input("triangulate.edge_sigma_px: more than 0 expected, found {}", edge_sigma_px);
+  if (!(edge_sigma_px > 0.0))
+    return invalid_input("triangulate.edge_sigma_px: more than 0 expected, found {}", edge_sigma_px);
   if (!(min_view_angle_deg > 0.0 && min_view_angle_deg < 90.0))
     return invalid_input("triangulate.min_view_angle_deg: between 0 and 90 expected, found {}", min_view_angle_deg);
   if (!(max_ray_distance_share > 0.0) || !(max_disagreement_share > 0.0) || !(min_rim_share > 0.0))
@@ -166,7 +176,8 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
   for (std::size_t i = 0; i < imprints.size(); ++i) {
     const int camera = static_cast<int>(i);
     auto view = view_of(imprints[i], camera, config.min_rim_share);
-    if (view && !known.insert(ids[i]).second) view = tl::make_unexpected(std::string("a second imprint of the same camera"));
+    if (view && !known.insert(ids[i]).second)
+      view = tl::make_unexpected(std::string("a second imprint of the same camera"));
     if (view) {
       views.push_back(std::move(*view));
     } else {
@@ -182,16 +193,24 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
   for (auto& [camera, reason] : agreeing->excluded) exclude(observed, camera, std::move(reason));
   if (agreeing->disagreement_mm > 0.0) {
     observed.disagreement_sigma_mm = agreeing->disagreement_mm;
-    observed.warnings.push_back(fmt::format(
-        "the cameras contradict each other by {:.1f} mm and it cannot be told which one is wrong; the intervals are widened",
-        agreeing->disagreement_mm));
+    observed.warnings.push_back(
+        fmt::format("the cameras contradict each other by {:.1f} mm and it cannot be told which one is wrong; the "
+                    "intervals are widened",
+                    agreeing->disagreement_mm));
   }
 
   AxisCurve axis = over_rims(agreeing->axis, rim_tangents(agreeing->views, agreeing->axis), config.sections);
   std::vector<FittedCircle> circles;
   for (int iteration = 0; iteration < 3; ++iteration) {
     circles = fit_circles(axis, rim_tangents(agreeing->views, axis));
+    if (!(median_radius(circles, 0, circles.size()) > 0.0))
+      return job_failed("no cross-section is seen by three rims: the stretches the cameras see do not overlap");
+    // Beyond the ends the outline follows the end circles, which must not bend the axis.
+    const EndPlanes ends = find_ends(agreeing->views, axis, circles, forging.end_section_mm).planes;
+    const double low = ends.first.seen ? ends.first.x_mm : axis.x_first_mm;
+    const double high = ends.last.seen ? ends.last.x_mm : axis.x_first_mm + axis.x_step_mm * (config.sections - 1);
     axis = moved_axis(axis, circles, config.axis_window);
+    if (high - low > 10.0 * axis.x_step_mm) axis = over(axis, low, high, config.sections);
   }
   const std::vector<RimTangent> tangents = rim_tangents(agreeing->views, axis);
   circles = fit_circles(axis, tangents);

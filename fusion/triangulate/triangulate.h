@@ -19,11 +19,11 @@ struct TriangulateConfig;  // in triangulate_config.h
 struct TangentPlane {
   Eigen::Vector3d normal_world = Eigen::Vector3d::UnitY();
   double offset_mm = 0.0;
-  double sigma_mm = 0.0;     ///< of the offset
-  double weight = 1.0;       ///< 0 to 1, from the imprint
-  int camera = 0;            ///< index into `cameras` of the observation
-  bool upper = false;        ///< which rim of that camera
-  double s_mm = 0.0;         ///< where along the observation's straight line the plane touches
+  double sigma_mm = 0.0;  ///< of the offset
+  double weight = 1.0;    ///< 0 to 1, from the imprint
+  int camera = 0;         ///< index into `cameras` of the observation
+  bool upper = false;     ///< which rim of that camera
+  double s_mm = 0.0;      ///< where along the observation's straight line the plane touches
   Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();  ///< from the camera's centre to the rim point, length 1
 };
 
@@ -37,7 +37,7 @@ struct EndReading {
 
 /// One cross-section of one observation.
 struct ObservedSection {
-  double s_mm = 0.0;                      ///< along the observation's straight line from its start
+  double s_mm = 0.0;  ///< along the observation's straight line from its start
   Eigen::Vector3d axis_world_mm = Eigen::Vector3d::Zero();
   std::vector<TangentPlane> tangents;
 };
@@ -57,9 +57,9 @@ struct ObservedForging {
   Eigen::Vector3d start_world_mm = Eigen::Vector3d::Zero();  ///< axis point at the first end
   Eigen::Vector3d end_world_mm = Eigen::Vector3d::Zero();
   double length_sigma_mm = 0.0;
-  double radius_mm = 0.0;             ///< median of the sections
+  double radius_mm = 0.0;  ///< median of the sections
   std::vector<EndReading> ends;
-  double disagreement_sigma_mm = 0.0; ///< of a camera's place across the axis, where cameras contradict each other
+  double disagreement_sigma_mm = 0.0;  ///< of a camera's place across the axis, where cameras contradict each other
   std::vector<ObservedSection> sections;
   std::vector<CameraShare> cameras;
   std::vector<std::string> warnings;
