@@ -35,14 +35,14 @@ Haze::Haze(const Scene& scene, const Layout& layout, int observation, int camera
   const BodyPose& body = layout.body_poses[static_cast<std::size_t>(observation)];
   start_ = project(model, pose.cam_from_world(body.world_from_body(Eigen::Vector3d::Zero())));
   end_ = project(model, pose.cam_from_world(body.world_from_body({layout.body.length_mm(), 0.0, 0.0})));
-  if (start_.x_px > end_.x_px) std::swap(start_, end_);
 }
 
 ObservedPoint Haze::at(const ObservedPoint& p) const {
   if (rms_px_ <= 0.0) return {0.0, 0.0};
-  const double t = std::clamp((p.x_px - start_.x_px) / (end_.x_px - start_.x_px), 0.0, 1.0);
-  const double beside = p.x_px - (start_.x_px + t * (end_.x_px - start_.x_px));
-  const double above = start_.y_px + t * (end_.y_px - start_.y_px) - p.y_px;
+  const double dx = end_.x_px - start_.x_px, dy = end_.y_px - start_.y_px;
+  const double t =
+      std::clamp(((p.x_px - start_.x_px) * dx + (p.y_px - start_.y_px) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+  const double beside = p.x_px - (start_.x_px + t * dx), above = start_.y_px + t * dy - p.y_px;
   const double u = beside / (0.5 * plume_px_), v = above / (above > 0.0 ? plume_px_ : 0.4 * plume_px_);
   const double near = std::exp(-0.5 * (u * u + v * v));
   const double rise = above > 0.0 ? v * std::exp(-0.5 * (v * v - 1.0)) * std::exp(-0.5 * u * u) : 0.0;

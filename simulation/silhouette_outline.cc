@@ -1,5 +1,6 @@
 #include "simulation/silhouette_outline.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -89,9 +90,12 @@ Result<BodyOutline> body_outline(const ForgingBody& body, const BodyPose& body_p
   const auto show_axis = [&](double x) { return view.show({x, 0.0, 0.0}); };
   const ObservedPoint start = show_axis(0.0), end = show_axis(length);
   const double dx = end.x_px - start.x_px, dy = end.y_px - start.y_px, length_px = std::hypot(dx, dy);
-  const double distance = center.tail<2>().norm();
-  if (!(distance > 2.0 * body.largest_radius_mm()) || !(length_px > 20.0)) {
-    return job_failed("camera \"{}\": looks along the forging or stands in it; place it to the side", camera.id);
+  const double reach = 2.0 * body.largest_radius_mm();
+  const double nearest =
+      std::min(view.pose.cam_from_world({0.0, 0.0, 0.0}).z(), view.pose.cam_from_world({length, 0.0, 0.0}).z());
+  if (!(nearest > reach) || !(center.tail<2>().norm() > reach) || !(length_px > 20.0)) {
+    return job_failed("camera \"{}\": looks along the forging, stands in it or turns its back; place it to the side",
+                      camera.id);
   }
 
   BodyOutline outline;

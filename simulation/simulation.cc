@@ -106,7 +106,7 @@ class FrameFactory {
   void work() {
     for (int frame = next_++; frame < total() && !failed_; frame = next_++) {
       const int camera = frame / observations(), observation = frame % observations();
-      auto written = make(camera, observation);
+      auto written = make_guarded(camera, observation);
       const std::lock_guard lock(report_);
       if (!written && !error_) error_ = written.error();
       failed_ = failed_ || !written;
@@ -115,6 +115,17 @@ class FrameFactory {
         progress_(image_name(observation, scene_.cameras[static_cast<std::size_t>(camera)].model.id),
                   static_cast<double>(done_) / total());
       }
+    }
+  }
+
+  // Nothing may leave a thread but a value.
+  Result<void> make_guarded(int camera, int observation) {
+    try {
+      return make(camera, observation);
+    } catch (const std::exception& error) {
+      return job_failed("{}: {}; are the images too large for this machine's memory?",
+                        image_name(observation, scene_.cameras[static_cast<std::size_t>(camera)].model.id),
+                        error.what());
     }
   }
 

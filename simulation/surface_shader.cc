@@ -79,16 +79,18 @@ double SurfaceShader::glowing(double x_mm, const Eigen::Vector3d& p, double faci
     const double above = scale_noise(p) - scale_threshold_;
     const double scale = smooth_step(-0.012, 0.02, above);
     if (scale > 0.0) {
-      // Thick scale is colder; seen aslant it hides all of the glow behind it.
+      // Thin at its border, thicker inside and blistered; seen aslant it hides all of the glow behind it.
       const double thickness =
-          0.75 + 0.5 * std::clamp(6.0 * above, 0.0, 1.0) + 0.25 * value_noise(seed_ + 60, p / (0.06 * size_mm_));
-      temperature -= scale * thickness * surface_.scale_drop_c * (1.0 + 0.6 * (1.0 - facing));
+          0.5 + 0.7 * std::clamp(3.0 * above, 0.0, 1.0) + 0.3 * value_noise(seed_ + 60, p / (0.05 * size_mm_));
+      temperature -= scale * thickness * surface_.scale_drop_c * (1.0 + 0.7 * (1.0 - facing));
     }
-    // Thin grey film, cracks and tool marks.
-    temperature -= 0.06 * surface_.scale_drop_c * (1.0 + fractal_noise(seed_ + 70, p / (0.05 * size_mm_), 3, 0.7));
+    // A grey film, uneven, with cracks and tool marks.
+    const double film = fractal_noise(seed_ + 70, p / (0.12 * size_mm_), 5, 0.75);
+    temperature -= 0.14 * surface_.scale_drop_c * (1.0 + film);
   }
   const double limb = 1.0 - surface_.limb_darkening * (1.0 - facing);
-  return surface_.level * limb * relative_radiance(temperature, surface_.temperature_c);
+  const double lit = surface_.scale_coverage > 0.0 ? 0.4 * wall_level_ * facing : 0.0;  // by the hall's lamps
+  return surface_.level * limb * relative_radiance(temperature, surface_.temperature_c) + lit;
 }
 
 double SurfaceShader::dark(double phi, const Eigen::Vector3d& p, double facing) const {

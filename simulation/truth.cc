@@ -1,6 +1,8 @@
 #include "simulation/truth.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string_view>
 
 #include <Eigen/Geometry>
@@ -70,7 +72,7 @@ ordered_json seen_targets(const Scene& scene, const Layout& layout, std::size_t 
                     {"ellipse_x_px", dot.ellipse_center.x_px},
                     {"ellipse_y_px", dot.ellipse_center.y_px},
                     {"dot_diameter_px", dot.diameter_px},
-                    {"facing_deg", std::acos(std::min(1.0, plate_facing(plate, pose))) * 180.0 / M_PI},
+                    {"facing_deg", std::acos(std::min(1.0, plate_facing(plate, pose))) * 180.0 / std::numbers::pi},
                     {"state", state_name(plate.state)}});
   }
   return json;
