@@ -317,10 +317,6 @@ class JointSolver {
     if (final) return true;
     learn_noise(equations);
     prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()));
-      fprintf(stderr, "noise %.4f corr %.3f tau2 %.4f tau3 %.4f tau4 %.4f len %.1f bend %.3g rad %.3g\n",
-              noise_scale_ * std::sqrt(median_variance()), correlation_, prior_.harmonic_sigma_mm(2),
-              prior_.harmonic_sigma_mm(3), prior_.harmonic_sigma_mm(4), prior_.harmonic_length_mm(),
-              prior_.bend_density(), prior_.radius_density());
     return true;
   }
 
