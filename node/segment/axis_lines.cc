@@ -27,7 +27,7 @@ class ColumnSums {
 
 // How much of the inside is brighter than the level halfway between outside and rim, 0 to 1. Two bodies with
 // a gap between them, or the rim of one and the rim of another, fail here.
-double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums, const RimPair& pair) {
+double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums, RimPair& pair) {
   const double width = pair.lower_px - pair.upper_px;
   const double band = std::max(2.0, 0.06 * width);
   const double above = sums.mean(pair.upper_px - 2 - band, pair.upper_px - 2);
@@ -37,12 +37,26 @@ double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums
   const double outside = std::max(above, below);
   const double step = std::min(at_upper - above, at_lower - below);
   if (step <= 0) return 0.0;
+  pair.step = static_cast<float>(step);
   const double level = std::min(outside, 0.5 * (above + below) + step) + 0.3 * step;
   int bright = 0, count = 0;
   const int from = static_cast<int>(pair.upper_px) + 2, to = static_cast<int>(pair.lower_px) - 2;
   for (int y = from; y <= to; y += 2, ++count) bright += image(y, x) > level;
   const double share = count > 0 ? static_cast<double>(bright) / count : 0.0;
-  return std::clamp((share - 0.4) / 0.4, 0.0, 1.0);
+  return std::clamp((share - 0.3) / 0.35, 0.0, 1.0);
+}
+
+// Weights by contrast: one half for a third of the step of the strongest pairs.
+void weigh_contrast(std::vector<std::vector<RimPair>>& pairs) {
+  std::vector<float> steps;
+  for (const auto& column : pairs)
+    for (const RimPair& pair : column) steps.push_back(pair.step);
+  if (steps.empty()) return;
+  const auto high = steps.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(steps.size() - 1));
+  std::nth_element(steps.begin(), high, steps.end());
+  const float half = *high / 3;
+  for (auto& column : pairs)
+    for (RimPair& pair : column) pair.weight *= pair.step / (pair.step + half);
 }
 
 }  // namespace
@@ -63,6 +77,7 @@ std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const R
       }
     }
   }
+  weigh_contrast(pairs);
   return pairs;
 }
 

@@ -10,8 +10,10 @@ namespace imprint {
 struct RimPair {
   float upper_px = 0;
   float lower_px = 0;
-  float weight = 0;  ///< 0 to 1: strength of both rims and how well the inside is brighter than the outside
+  float weight = 0;  ///< 0 to 1: strength of both rims, how well the inside is brighter than the outside, and contrast
+  float step = 0;    ///< the lower of the grey level steps at both rims, share of full scale
 
+  [[nodiscard]] float width_px() const { return lower_px - upper_px; }
   [[nodiscard]] float middle_px() const { return 0.5F * (upper_px + lower_px); }
 };
 
@@ -25,7 +27,8 @@ struct AxisLine {
   [[nodiscard]] double y_px(double x_px) const { return y0_px + slope * (x_px - x0_px); }
 };
 
-/// The pairs of each column whose distance is between the limits (virtual axis points of [C] 2.3.2).
+/// The pairs of each column whose distance is between the limits (virtual axis points of [C] 2.3.2). Contrast counts
+/// against that of the image's strongest pairs and only softly: clutter may be brighter than the forging.
 std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px,
                                             double max_width_px);
 

@@ -23,31 +23,33 @@ double jump_cost(const RimPair& a, const RimPair& b, int columns_apart, double s
   return std::min(8.0, 0.8 * std::max(0.0, shift - free)) + std::min(4.0, 0.5 * std::max(0.0, widening - free));
 }
 
-// Is the body still there between two columns: the middle third about as bright as at both ends?
+// Is the body still there between two columns, about as bright as at both ends?
 bool inside_goes_on(const cv::Mat_<float>& image, const RimPair& a, int ax, const RimPair& b, int bx) {
-  const auto middle_level = [&](int x, const RimPair& pair) {
-    const double third = (pair.lower_px - pair.upper_px) / 3.0;
-    const int from = std::clamp(static_cast<int>(pair.upper_px + third), 0, image.rows - 1);
-    const int to = std::clamp(static_cast<int>(pair.lower_px - third), from, image.rows - 1);
-    double sum = 0;
-    for (int y = from; y <= to; ++y) sum += image(y, x);
-    return sum / (to - from + 1);
+  // The upper quartile: scale may darken most of a section.
+  const auto body_level = [&](int x, const RimPair& pair) {
+    const int from = std::clamp(static_cast<int>(pair.upper_px) + 2, 0, image.rows - 1);
+    const int to = std::clamp(static_cast<int>(pair.lower_px) - 2, from, image.rows - 1);
+    std::vector<float> values;
+    for (int y = from; y <= to; y += 2) values.push_back(image(y, x));
+    const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(3 * values.size() / 4);
+    std::nth_element(values.begin(), quartile, values.end());
+    return *quartile;
   };
   const auto outside_level = [&](int x, const RimPair& pair) {
     const int above = std::clamp(static_cast<int>(pair.upper_px) - 4, 0, image.rows - 1);
     const int below = std::clamp(static_cast<int>(pair.lower_px) + 4, 0, image.rows - 1);
     return std::max(image(above, x), image(below, x));
   };
-  const double body = std::min(middle_level(ax, a), middle_level(bx, b));
+  const double body = std::min(body_level(ax, a), body_level(bx, b));
   const double threshold = 0.5 * (body + std::max(outside_level(ax, a), outside_level(bx, b)));
   int there = 0, count = 0;
   for (int x = ax + 1; x < bx; ++x, ++count) {
     const double t = static_cast<double>(x - ax) / (bx - ax);
     const RimPair between{static_cast<float>(a.upper_px + t * (b.upper_px - a.upper_px)),
                           static_cast<float>(a.lower_px + t * (b.lower_px - a.lower_px)), 0};
-    there += middle_level(x, between) > threshold;
+    there += body_level(x, between) > threshold;
   }
-  return count == 0 || there >= 0.6 * count;
+  return count == 0 || there >= 0.5 * count;
 }
 
 }  // namespace
@@ -62,10 +64,19 @@ double BodyPath::median_width_px() const {
   return *middle;
 }
 
+double BodyPath::mean_weight() const {
+  double sum = 0;
+  for (const Column& c : columns) sum += c.pair.weight;
+  return sum / std::max(1, length_px());
+}
+
 BodyPath follow_body(const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working, const AxisLine& line,
-                     double max_offset_px, double max_gap_px) {
+                     double max_offset_px, double max_gap_widths) {
   std::vector<int> reach{1, 2, 3, 4};
-  for (int r = 6; r <= max_gap_px; r = r * 5 / 4 + 1) reach.push_back(r);
+  double widest = 0;
+  for (const auto& column : pairs)
+    for (const RimPair& pair : column) widest = std::max(widest, static_cast<double>(pair.width_px()));
+  for (int r = 6; r <= max_gap_widths * widest; r = r * 5 / 4 + 1) reach.push_back(r);
 
   std::vector<std::vector<Node>> nodes(pairs.size());
   int best_x = -1, best_index = -1;
@@ -78,7 +89,7 @@ BodyPath follow_body(const std::vector<std::vector<RimPair>>& pairs, const Worki
       Node& node = here[n];
       double inherited = 0.0;
       for (const int r : reach) {
-        if (r > x) break;
+        if (r > x || (r > 8 && r > max_gap_widths * node.pair.width_px())) break;
         const auto& before = nodes[static_cast<std::size_t>(x - r)];
         for (std::size_t m = 0; m < before.size(); ++m) {
           const double gain = before[m].gain - 0.15 * (r - 1) - jump_cost(before[m].pair, node.pair, r, line.slope);

@@ -18,11 +18,12 @@ struct BodyPath {
   [[nodiscard]] bool empty() const { return columns.empty(); }
   [[nodiscard]] int length_px() const { return empty() ? 0 : columns.back().x_px - columns.front().x_px + 1; }
   [[nodiscard]] double median_width_px() const;
+  [[nodiscard]] double mean_weight() const;  ///< over its whole length, gaps counting 0
 };
 
 /// The best chain of rim pairs near `line` (Viterbi along the columns). Widths may jump (steps of a forging) at a
-/// fixed cost, the middle may hardly; interruptions are bridged up to `max_gap_px` where the inside goes on.
+/// fixed cost, the middle may hardly; interruptions are bridged up to `max_gap_widths` widths where the inside goes on.
 BodyPath follow_body(const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working, const AxisLine& line,
-                     double max_offset_px, double max_gap_px);
+                     double max_offset_px, double max_gap_widths);
 
 }  // namespace imprint

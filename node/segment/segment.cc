@@ -34,6 +34,29 @@ AxisLine fit_axis(const BodyPath& path) {
   return line;
 }
 
+// How well a body fits what is looked for, 0 to 1: seen and bright along its length, elongated, of a likely width, and
+// near where the cameras of a rig are pointed. Zero when it is too short to be told from a plate.
+double rate_body(const BodyPath& path, const WorkingImage& working, const SegmentPrior& prior,
+                 const SegmentConfig& config) {
+  if (path.empty()) return 0.0;
+  const double width = path.median_width_px(), elongation = path.length_px() / std::max(1.0, width);
+  if (elongation < config.min_elongation) return 0.0;
+  const double by_length = std::min(1.0, elongation / config.full_elongation);
+
+  const double width_px = width * working.reduction;
+  const double low = prior.likely_min_px > 0 ? prior.likely_min_px : prior.diameter_min_px;
+  const double high = prior.likely_max_px > 0 ? prior.likely_max_px : prior.diameter_max_px;
+  const double off_range = std::max({1.0, low / width_px, width_px / high});
+  const double by_width = 1.0 / (off_range * off_range);
+
+  const cv::Size size = working.intensity.size();
+  double nearest = 1e18;
+  for (const auto& c : path.columns)
+    nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
+  const double z = nearest / (config.center_reach * working.shorter_side_px);
+  return path.mean_weight() * by_length * by_width / (1 + z * z);
+}
+
 struct RimSample {
   double station_px, upper_px, lower_px;
 };
@@ -140,24 +163,20 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
         "no forging: edges were found, but no two of them {:.0f} to {:.0f} px apart with a {} body between",
         prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
 
-  BodyPath best;
+  BodyPath best, longest;
+  double best_rating = 0.0;
   const double max_offset = config.max_axis_bow * prior.diameter_min_px / r + 3.0;
   for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, 0.3 * prior.diameter_min_px / r, config)) {
-    const BodyPath path =
-        follow_body(pairs, working, line, max_offset, config.max_gap_diameters * prior.diameter_min_px / r);
-    if (path.length_px() < config.min_elongation * path.median_width_px()) {
-      if (best.length_px() < path.length_px() && best.length_px() < config.min_elongation * best.median_width_px())
-        best = path;
-      continue;
-    }
-    const bool best_is_long = best.length_px() >= config.min_elongation * best.median_width_px();
-    if (best.empty() || !best_is_long || path.evidence > best.evidence) best = path;
+    const BodyPath path = follow_body(pairs, working, line, max_offset, config.max_gap_diameters);
+    if (path.length_px() > longest.length_px()) longest = path;
+    const double rating = rate_body(path, working, prior, config);
+    if (rating > best_rating) best_rating = rating, best = path;
   }
-  if (best.empty() || best.length_px() < config.min_elongation * best.median_width_px())
+  if (best.empty())
     return job_failed(
         "no forging: the longest body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths "
         "is needed",
-        best.length_px() * r, best.median_width_px() * r, config.min_elongation);
+        longest.length_px() * r, longest.median_width_px() * r, config.min_elongation);
   Segmentation found = describe(best, working, config);
   if (found.score < config.min_score)
     return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",

@@ -15,6 +15,8 @@ struct SegmentPrior {
   double direction_y = 0.0;
   double diameter_min_px = 0.0;  ///< range of the silhouette's width across the axis
   double diameter_max_px = 0.0;
+  double likely_min_px = 0.0;  ///< the part of that range that is likely; 0: all of it
+  double likely_max_px = 0.0;
   Polarity polarity = Polarity::bright;
 };
 

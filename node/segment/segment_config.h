@@ -16,9 +16,11 @@ struct SegmentConfig {
   int min_rim_run_px = 9;                 // length of the opening along the axis, reduced; ours
   double max_tilt_deg = 10.0;             // forging against the prior direction; ours
   int max_rims_per_column = 12;           // of each kind, the strongest; ours
-  int axis_candidates = 6;                // Hough lines looked into; ours
+  int axis_candidates = 12;               // Hough lines looked into; ours
   double max_axis_bow = 0.25;             // axis from a straight line, share of the smallest diameter; ours
   double min_elongation = 2.0;            // seen length over diameter that makes a forging; ours
+  double full_elongation = 5.0;           // beyond this, length is no further evidence: beams are long too; ours
+  double center_reach = 0.35;             // off the image's middle by this share of its shorter side counts half; ours
   double min_score = 0.35;                // share of the length with both rims; ours
   double max_gap_diameters = 1.0;         // longest interruption bridged, in local diameters; ours
 

@@ -46,6 +46,8 @@ Result<SegmentPrior> make_segment_prior(const CameraModel& camera, const CameraP
   prior.direction_y = (b.y_px - a.y_px) / length;
   prior.diameter_min_px = camera.focal_length_px * forging.diameter_min_mm / (kFarthest * depth_mm);
   prior.diameter_max_px = camera.focal_length_px * forging.diameter_max_mm / (kNearest * depth_mm);
+  prior.likely_min_px = camera.focal_length_px * forging.diameter_min_mm / depth_mm;
+  prior.likely_max_px = camera.focal_length_px * forging.diameter_max_mm / depth_mm;
   prior.polarity = forging.polarity;
   return prior;
 }

@@ -16,6 +16,7 @@ WorkingImage make_working_image(const cv::Mat& image, const SegmentPrior& prior,
       std::clamp(std::min({by_width, image.cols / 64, image.rows / 64}), 1, config.max_reduction);
 
   const cv::Size reduced_size(image.cols / r, image.rows / r);
+  working.shorter_side_px = std::min(reduced_size.width, reduced_size.height);
   const cv::Mat whole = image(cv::Rect(0, 0, reduced_size.width * r, reduced_size.height * r));
   cv::Mat reduced;
   cv::resize(whole, reduced, reduced_size, 0, 0, cv::INTER_AREA);

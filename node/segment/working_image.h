@@ -13,6 +13,7 @@ struct WorkingImage {
   cv::Mat_<float> intensity;      ///< share of full scale; a dark forging is inverted, so it is always brighter
   cv::Mat_<unsigned char> valid;  ///< 255 where the camera saw something
   int reduction = 1;
+  double shorter_side_px = 0.0;     ///< of the whole reduced image
   double quantum = 1.0 / 255;       ///< one grey level, share of full scale
   cv::Matx23d source_from_working;  ///< working px -> px of the observed image
 
