@@ -113,7 +113,8 @@ Result<BodyOutline> body_outline(const ForgingBody& body, const BodyPose& body_p
   for (const auto& rim : rims) {
     if (const int fold = folded_station(rim, dx, dy); fold >= 0) {
       return job_failed(
-          "camera \"{}\": a step at {:.0f} mm of the forging hides the surface behind it; lengthen transition_mm",
+          "camera \"{}\": the rim at {:.0f} mm of the forging hides behind a step; lengthen transition_mm or move the "
+          "camera to face the forging",
           camera.id, length * fold / stations);
     }
   }
