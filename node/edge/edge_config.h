@@ -16,7 +16,9 @@ struct EdgeConfig {
   int max_candidates = 6;           // edges a scan line, the strongest; ours
   double jump_cost = 6.0;           // of leaving one edge for another, in well-seen stations; ours
   double outermost_bonus = 0.5;     // of the outermost edge of a body, in well-seen stations; ours
-  int max_gap_stations = 60;        // longest stretch without edge that a rim is followed across; ours
+  double outermost_share = 0.4;     // its least gradient, share of the strongest edge's on the scan line: a plate
+                                    // or beam behind the rim is weaker than that; ours
+  int max_gap_stations = 300;       // longest stretch without edge that a rim is followed across; ours
   int blur_region_stations = 256;   // the blur is taken as constant over this length; ours
   double end_half_band = 0.15;      // rows on either side of the axis for the ends, share of the diameter; ours
   double end_search_px = 24.0;      // about the coarse end; ours

@@ -111,23 +111,41 @@ std::vector<EdgeCandidate> find_peaks(const ScanLines& scan, const ScanLine& lin
   return peaks;
 }
 
-// The outermost edge from which the body goes on without a fall back to the background gets the bonus.
-void reward_outermost(const ScanLine& line, const SmoothLines& smooth, double spacing_px, double bonus,
+// The outermost edge of some strength from which the body goes on without a fall back to the background gets the bonus.
+void reward_outermost(const ScanLine& line, const SmoothLines& smooth, double spacing_px, const EdgeConfig& config,
                       std::vector<EdgeCandidate>& peaks) {
+  double strongest = 0;
+  for (const EdgeCandidate& peak : peaks) strongest = std::max(strongest, peak.slope);
   const float* level = smooth.level.data() + line.begin;
   const auto sample = [&](double position_px) {
     return std::clamp(static_cast<int>(std::lround((position_px - line.first_px) / spacing_px)), 0, line.count - 1);
   };
   for (std::size_t k = 0; k < peaks.size(); ++k) {
+    if (peaks[k].slope < config.outermost_share * strongest) continue;
     const int before = sample(peaks[k].position_px - 3), after = sample(peaks[k].position_px + 3);
     const float background = level[before], body = level[after];
     const float fallen = background + 0.35F * (body - background);
     bool goes_on = true;
     for (int i = after; i < line.count && goes_on; ++i) goes_on = level[i] > fallen;
     if (!goes_on) continue;
-    peaks[k].reward += bonus;
+    peaks[k].reward += config.outermost_bonus;
     break;
   }
+}
+
+// Edges as strong as the rim usually is count full, weak ones less: most of the rim is seen against the background.
+void reward_usual_strength(std::vector<std::vector<EdgeCandidate>>& peaks) {
+  std::vector<double> strongest;
+  for (const auto& line : peaks) {
+    double most = 0;
+    for (const EdgeCandidate& peak : line) most = std::max(most, peak.slope);
+    if (most > 0) strongest.push_back(most);
+  }
+  if (strongest.empty()) return;
+  const auto middle = strongest.begin() + static_cast<std::ptrdiff_t>(strongest.size() / 2);
+  std::nth_element(strongest.begin(), middle, strongest.end());
+  for (auto& line : peaks)
+    for (EdgeCandidate& peak : line) peak.reward *= 0.35 + 0.65 * std::min(1.0, peak.slope / (0.7 * *middle));
 }
 
 struct Node {
@@ -145,14 +163,16 @@ std::vector<TracedEdge> trace_rim(const ScanLines& scan, bool prefer_outermost, 
   std::vector<int> reach{1, 2, 3, 4};
   for (int r = 6; r <= config.max_gap_stations; r = r * 4 / 3 + 1) reach.push_back(r);
 
+  std::vector<std::vector<EdgeCandidate>> peaks(scan.lines.size());
+  for (std::size_t n = 0; n < scan.lines.size(); ++n) peaks[n] = find_peaks(scan, scan.lines[n], smooth, config);
+  reward_usual_strength(peaks);
   std::vector<std::vector<Node>> nodes(scan.lines.size());
   int best_line = -1, best_index = -1;
   double best_gain = 0.0;
   for (std::size_t n = 0; n < scan.lines.size(); ++n) {
     const ScanLine& line = scan.lines[n];
-    auto peaks = find_peaks(scan, line, smooth, config);
-    if (prefer_outermost) reward_outermost(line, smooth, scan.spacing_px, config.outermost_bonus, peaks);
-    for (const EdgeCandidate& peak : peaks) {
+    if (prefer_outermost) reward_outermost(line, smooth, scan.spacing_px, config, peaks[n]);
+    for (const EdgeCandidate& peak : peaks[n]) {
       Node node{peak};
       double inherited = 0.0;
       for (const int r : reach) {

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "node/edge/edge_config.h"
-#include "node/edge/silhouette_frame.h"
 #include "node/edge/locate_edges.h"
+#include "node/edge/silhouette_frame.h"
 
 namespace imprint {
 

@@ -6,8 +6,8 @@
 
 #include "node/edge/edge_config.h"
 #include "node/edge/forging_ends.h"
-#include "node/edge/silhouette_frame.h"
 #include "node/edge/rim_edges.h"
+#include "node/edge/silhouette_frame.h"
 
 namespace imprint {
 namespace {

@@ -35,9 +35,9 @@ Result<void> FilterConfig::validate() const {
         max_region_gap, min_region_length, max_region_jump_px);
   if (!(min_coverage >= 0 && min_coverage <= 1))
     return invalid_input("filter.min_coverage: expected 0 to 1, found {}", min_coverage);
-  if (!(min_step_px > 0) || !(min_disagreement_px > 0))
-    return invalid_input("filter: expected min_step_px and min_disagreement_px > 0, found {} and {}", min_step_px,
-                         min_disagreement_px);
+  if (!(min_step_px > 0) || !(min_disagreement_px > 0) || !(min_kink > 0))
+    return invalid_input("filter: expected min_step_px, min_disagreement_px and min_kink > 0, found {}, {} and {}",
+                         min_step_px, min_disagreement_px, min_kink);
   return {};
 }
 

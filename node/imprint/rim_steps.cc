@@ -22,14 +22,6 @@ std::optional<double> median_between(const RimCurve& rim, double from, double to
   return median(offsets);
 }
 
-// How far the rim lies off the line between its own course just before and just after [from, to].
-std::optional<double> displacement(const RimCurve& rim, double from, double to, double reach) {
-  const auto before = median_between(rim, from - reach, from - 1), after = median_between(rim, to + 1, to + reach);
-  const auto within = median_between(rim, from, to);
-  if (!before || !after || !within) return std::nullopt;
-  return *within - 0.5 * (*before + *after);
-}
-
 }  // namespace
 
 double rim_noise_px(const RimCurve& rim) {
@@ -59,48 +51,30 @@ void drop_spikes(RimCurve& rim) {
 }
 
 std::vector<double> find_cuts(const RimCurve& rim, double noise_px, const FilterConfig& config) {
-  const double threshold = std::max(config.min_step_px, 5 * noise_px);
-  std::vector<double> jump(rim.size(), 0.0);
+  const double step = std::max(config.min_step_px, 5 * noise_px);
+  const double kink = std::max(config.min_kink, 2.5 * noise_px / config.step_window);
+  std::vector<double> change(rim.size(), 0.0);  // 1 where a step or a kink reaches its threshold
   for (std::size_t i = 1; i < rim.size(); ++i) {
-    const double between = 0.5 * (rim[i - 1].station_px + rim[i].station_px);
-    const double reach = 0.5 * config.step_window;
+    const double reach = 0.5 * config.step_window, between = 0.5 * (rim[i - 1].station_px + rim[i].station_px);
     // Next to a gap the sides are taken from its two ends.
-    const SampleRange before = samples_near(rim, rim[i - 1].station_px - reach, reach),
-                      after = samples_near(rim, rim[i].station_px + reach, reach);
-    const auto left = fit_at_station(rim, before, between, 1), right = fit_at_station(rim, after, between, 1);
-    if (left && right && before.last - before.first >= 3 && after.last - after.first >= 3)
-      jump[i] = std::abs(*right - *left);
+    const SampleRange before = samples_near(rim, rim[i - 1].station_px - reach, reach);
+    const SampleRange after = samples_near(rim, rim[i].station_px + reach, reach);
+    const auto left = fit_parabola(rim.data() + before.first, rim.data() + before.last, between, 1);
+    const auto right = fit_parabola(rim.data() + after.first, rim.data() + after.last, between, 1);
+    if (!left || !right || before.last - before.first < 3 || after.last - after.first < 3) continue;
+    change[i] = std::max(std::abs(right->c0 - left->c0) / step, std::abs(right->c1 - left->c1) / kink);
+    if (rim[i].station_px - rim[i - 1].station_px > config.max_region_gap) change[i] = std::max(change[i], 1e6);
   }
   std::vector<double> cuts;
   for (std::size_t i = 1; i < rim.size(); ++i) {
-    if (jump[i] < threshold) continue;
+    if (change[i] < 1) continue;
     const SampleRange near = samples_near(rim, rim[i].station_px, 3);
     bool highest = true;
     for (std::size_t k = near.first; k < near.last && highest; ++k)
-      highest = jump[k] < jump[i] || k == i || (jump[k] == jump[i] && k > i);
+      highest = change[k] < change[i] || k == i || (change[k] == change[i] && k > i);
     if (highest) cuts.push_back(0.5 * (rim[i - 1].station_px + rim[i].station_px));
   }
   return cuts;
-}
-
-void reject_patches(RimCurve& rim, const std::vector<double>& cuts, const RimCurve& other, const FilterConfig& config) {
-  constexpr double kReachPx = 12;
-  for (std::size_t a = 0; a < cuts.size(); ++a) {
-    for (std::size_t b = a + 1; b < cuts.size() && cuts[b] - cuts[a] <= config.max_patch_length; ++b) {
-      const double from = cuts[a], to = cuts[b];
-      const auto before = median_between(rim, from - kReachPx, from - 0.5),
-                 after = median_between(rim, to + 0.5, to + kReachPx);
-      const auto moved = displacement(rim, from, to, kReachPx);
-      if (!moved || std::abs(*moved) < config.min_step_px) continue;
-      // A return to the old line makes a patch; a stair does not.
-      if (std::abs(*after - *before) > std::max(1.5, 0.4 * std::abs(*moved))) continue;
-      const auto mirrored = displacement(other, from, to, kReachPx);
-      if (mirrored && -*mirrored * *moved > 0.4 * *moved * *moved)
-        continue;  // both rims move in or out: a collar or a groove
-      const SampleRange range = samples_near(rim, 0.5 * (from + to), 0.5 * (to - from));
-      for (std::size_t i = range.first; i < range.last; ++i) rim[i].weight = 0.0;
-    }
-  }
 }
 
 }  // namespace imprint

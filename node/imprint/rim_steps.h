@@ -11,12 +11,8 @@ double rim_noise_px(const RimCurve& rim);
 /// Takes weight from samples that leave the median of their neighbourhood.
 void drop_spikes(RimCurve& rim);
 
-/// Stations between which the rim has no step: where the lines through the samples on the left and on the right meet
-/// a station with different values. Ascending.
+/// Stations between which the rim has neither step nor kink: where the lines through the samples on the left and on the
+/// right meet a station with different values or slopes, and in the middle of gaps. Ascending.
 std::vector<double> find_cuts(const RimCurve& rim, double noise_px, const FilterConfig& config);
-
-/// Takes all weight from stretches between two cuts that leave the line from the stretch before to the one after while
-/// the other rim goes straight on.
-void reject_patches(RimCurve& rim, const std::vector<double>& cuts, const RimCurve& other, const FilterConfig& config);
 
 }  // namespace imprint

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "node/imprint/rim_chain.h"
 #include "node/imprint/rim_steps.h"
 
 namespace imprint {
@@ -14,6 +15,15 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+double median_width(const RimCurve& upper, const RimCurve& lower) {
+  std::vector<double> widths;
+  for (std::size_t i = 0, k = 0; i < upper.size() && k < lower.size();) {
+    if (upper[i].station_px == lower[k].station_px) widths.push_back(lower[k].offset_px - upper[i].offset_px);
+    upper[i].station_px <= lower[k].station_px ? ++i : ++k;
+  }
+  return median(widths);
 }
 
 // What the point's own looks say: a weak edge, one that runs askew to its neighbours or a bad fit counts less.
@@ -152,8 +162,10 @@ FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& c
   const double noise_upper = rim_noise_px(upper), noise_lower = rim_noise_px(lower);
   const std::vector<double> upper_cuts = find_cuts(upper, noise_upper, config),
                             lower_cuts = find_cuts(lower, noise_lower, config);
-  reject_patches(upper, upper_cuts, lower, config);
-  reject_patches(lower, lower_cuts, upper, config);
+  const double diameter_px = median_width(upper, lower);
+  const RimCurve upper_before = upper;
+  keep_likeliest_course(upper, upper_cuts, lower, noise_upper, diameter_px, config);
+  keep_likeliest_course(lower, lower_cuts, upper_before, noise_lower, diameter_px, config);
   reject_disagreement(upper, lower, config);
 
   FilteredCurves out;
