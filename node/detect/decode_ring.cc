@@ -38,6 +38,25 @@ double log_likelihood(const RingScan& scan, std::size_t bit, int before, int own
   return log_likelihood(scan.reading[bit], expected, std::hypot(black_sigma, white_sigma * expected, scan.noise));
 }
 
+double bit_contrast(const RingScan& scan, std::size_t bit) {
+  return std::max(scan.response[bit].light * scan.response[bit].own, 0.1);
+}
+
+/// What the code has the bit's reading be; `flipped`: were the bit of the other colour.
+double expected_reading(const RingScan& scan, std::uint32_t code, int bit, bool flipped) {
+  const int bits = static_cast<int>(scan.reading.size());
+  const int own = bit_of(code, bits, bit);
+  return scan.response[static_cast<std::size_t>(bit)].reading(bit_of(code, bits, bit + bits - 1),
+                                                              flipped ? 1 - own : own, bit_of(code, bits, bit + 1));
+}
+
+/// Whether the bit shows the colour that the code has there.
+bool is_known(const RingScan& scan, std::uint32_t code, int bit) {
+  const auto at = static_cast<std::size_t>(bit);
+  const double off = std::abs(scan.reading[at] - expected_reading(scan, code, bit, false));
+  return off <= known_limit * bit_contrast(scan, at) + 2.0 * scan.noise;
+}
+
 /// Log likelihood of stretches of a code, so that a whole code costs few look-ups: each stretch of five bits depends
 /// on those and their two neighbours.
 class StretchTables {
@@ -97,6 +116,9 @@ bool fit_light(RingScan& scan, std::uint32_t code, int bits) {
   }
   if (white < 2) return false;
   const Eigen::Vector3d fitted = normal.ldlt().solve(right);
+  // The paint of dot and ring is one: where the ring as a whole were darker, it would be another thing's.
+  constexpr double most_level = 0.5;  // logarithm
+  if (std::abs(fitted[0]) > most_level) return false;
   set_light(scan, fitted.tail<2>(), std::exp(fitted[0]));
   return true;
 }
@@ -133,7 +155,7 @@ DecodedRing RingDecoder::decode(RingScan& scan) const {
     RingScan relit = scan;
     if (!fit_light(relit, ring.code, bits_)) break;
     const DecodedRing next = decode_once(relit);
-    if (!(next.profile < ring.profile)) break;
+    if (next.wrong > 0 || !(next.profile < ring.profile)) break;  // a light of one's own choice explains enough
     ring = next;
     scan = std::move(relit);
   }
@@ -168,29 +190,24 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   const double sigma = std::hypot(black_sigma, white_sigma, scan.noise);
   const double one_wrong_bit = log_likelihood(0.0, 0.0, sigma) - log_likelihood(1.0, 0.0, sigma);
   ring.margin = codes_.size() < 2 ? bits_ : (best.log_likelihood - second.log_likelihood) / one_wrong_bit;
-  compare_bits(scan, best.code, ring);
+  compare_bits(scan, ring);
   compare_profile(scan, ring);
   ring.accepted = accepts(ring);
   return ring;
 }
 
-void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const {
+void RingDecoder::compare_bits(const RingScan& scan, DecodedRing& ring) const {
   double sum = 0.0;
   int known = 0;
   for (int i = 0; i < bits_; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const BitResponse& response = scan.response[at];
-    const int before = bit_of(code, bits_, i + bits_ - 1);
-    const int own = bit_of(code, bits_, i);
-    const int after = bit_of(code, bits_, i + 1);
-    const double contrast = std::max(response.light * response.own, 0.1);
-    const double limit = known_limit * contrast + 2.0 * scan.noise;
-    const double off = std::abs(scan.reading[at] - response.reading(before, own, after));
-    const double other = std::abs(scan.reading[at] - response.reading(before, 1 - own, after));
-    if (off <= limit) {
+    const double contrast = bit_contrast(scan, at);
+    const double off = std::abs(scan.reading[at] - expected_reading(scan, ring.code, i, false));
+    const double other = std::abs(scan.reading[at] - expected_reading(scan, ring.code, i, true));
+    if (is_known(scan, ring.code, i)) {
       sum += off * off / std::max(0.25, contrast * contrast);
       ++known;
-    } else if (other <= limit) {
+    } else if (other <= known_limit * contrast + 2.0 * scan.noise) {
       ++ring.wrong;
     } else {
       ++ring.unknown;
@@ -200,7 +217,7 @@ void RingDecoder::compare_bits(const RingScan& scan, std::uint32_t code, Decoded
   ring.fit = known > 0 ? std::sqrt(sum / known) : 1.0;
 }
 
-/// Columns that are off by more than `known_limit` count as if they were off by that: they belong to dirt or a cover.
+/// Over the bits that show the code's colour; a column counts as no farther off than half the contrast (dirt).
 void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const {
   double sum = 0.0;
   int count = 0;
@@ -209,6 +226,7 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
     const int before = bit_of(ring.code, bits_, i + bits_ - 1);
     const int own = bit_of(ring.code, bits_, i);
     const int after = bit_of(ring.code, bits_, i + 1);
+    if (!is_known(scan, ring.code, i)) continue;
     for (int k = 0; k < columns_per_bit; ++k) {
       const double column = scan.columns[at * columns_per_bit + static_cast<std::size_t>(k)];
       if (std::isnan(column)) continue;

@@ -43,7 +43,7 @@ class RingDecoder {
   [[nodiscard]] DecodedRing decode_once(const RingScan& scan) const;
   [[nodiscard]] bool accepts(const DecodedRing& ring) const;
   void compare_profile(const RingScan& scan, DecodedRing& ring) const;
-  void compare_bits(const RingScan& scan, std::uint32_t code, DecodedRing& ring) const;
+  void compare_bits(const RingScan& scan, DecodedRing& ring) const;
 
   int bits_;
   double max_unknown_;

@@ -89,6 +89,7 @@ class TargetSearch {
         library_(library),
         decoder_(library, config.max_unknown),
         config_(config),
+        noise_(image_noise(pyramid_.level(0))),
         trace_(trace) {}
 
   std::vector<DetectedTarget> run() {
@@ -147,35 +148,61 @@ class TargetSearch {
     const GreyImage& level = pyramid_.level(l);
     const auto rough = fit_dot(level, {star.ellipse, star.black, star.white - star.black});
     if (!rough || rough->contrast < config_.min_contrast) return Rejection::poor_ellipse;
-    if (const Rejection rejection = decode(from_level(*rough, l), nullptr); rejection != Rejection::none)
-      return rejection;
-    if (l == 0) return decode(*rough, &found_);
-    const FittedDot guess = from_level(*rough, l);
-    const double pixel_width = 1.0 / 12.0;
-    const double blur = std::sqrt(std::max(
-        pixel_width, guess.blur_px * guess.blur_px - pixel_width * ImagePyramid::scale(l) * ImagePyramid::scale(l)));
-    const auto fine = fit_dot(pyramid_.level(0), {guess.ellipse, guess.black, guess.contrast, blur});
-    return fine ? decode(*fine, &found_) : Rejection::poor_ellipse;
+    if (is_poor(*rough, noise_ / ImagePyramid::scale(l))) return Rejection::poor_ellipse;
+    const FittedDot guess = at_full_resolution(*rough, l);
+    const DecodedDot first = decode(guess);
+    if (first.rejection != Rejection::none) return first.rejection;
+    // Now that the code is known, its light can be taken off: in small dots it reaches the window.
+    const auto ring_light = [&](const Eigen::Vector2d& place) {
+      return ring_light_at(place, guess, first.scan, first.ring.code, library_.geometry);
+    };
+    const auto fine =
+        fit_dot(pyramid_.level(0), {guess.ellipse, guess.black, guess.contrast, guess.blur_px}, ring_light);
+    if (!fine || is_poor(*fine, noise_)) return Rejection::poor_ellipse;
+    const DecodedDot second = decode(*fine);
+    if (second.rejection != Rejection::none) return second.rejection;
+    const DetectedTarget target{second.ring.id,
+                                {fine->ellipse.center.x(), fine->ellipse.center.y()},
+                                fine->sigma_px,
+                                diameter_of(fine->ellipse),
+                                second.ring.distance};
+    found_.push_back({target, fine->ellipse, second.ring.margin, second.ring.fit});
+    return Rejection::none;
   }
 
-  /// Decodes the ring of a dot and notes the target in `found` where it is accepted and `found` is given.
-  Rejection decode(const FittedDot& dot, std::vector<Found>* found) {
+  /// A dot of one level in px of the image, without the width of the level's larger pixels.
+  static FittedDot at_full_resolution(const FittedDot& rough, int level) {
+    FittedDot full = from_level(rough, level);
+    const double pixel_variance = 1.0 / 12.0;
+    const double level_variance = pixel_variance * ImagePyramid::scale(level) * ImagePyramid::scale(level);
+    full.blur_px = std::sqrt(std::max(pixel_variance, full.blur_px * full.blur_px + pixel_variance - level_variance));
+    return full;
+  }
+
+  /// Whether the grey values are farther from a dot's than noise and small flaws make them.
+  static bool is_poor(const FittedDot& dot, double noise) {
+    constexpr double flaws = 0.12;  // share of the contrast
+    return dot.residual > std::hypot(flaws * dot.contrast, 2.0 * noise) ||
+           dot.sigma_px > max_sigma_of_diameter * diameter_of(dot.ellipse);
+  }
+
+  struct DecodedDot {
+    Rejection rejection = Rejection::none;
+    RingScan scan;
+    DecodedRing ring;
+  };
+
+  DecodedDot decode(const FittedDot& dot) {
     const double diameter = diameter_of(dot.ellipse);
-    if (diameter < config_.min_dot_px || diameter > config_.max_dot_px) return Rejection::size;
+    if (diameter < config_.min_dot_px || diameter > config_.max_dot_px) return {Rejection::size, {}, {}};
     const EllipseAxes axes = axes_of(dot.ellipse);
-    if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return Rejection::poor_ellipse;
-    if (dot.sigma_px > max_sigma_of_diameter * diameter) return Rejection::poor_ellipse;
-    auto scan = scan_ring(pyramid_, dot, library_.bits, library_.geometry, config_.max_unknown);
-    if (!scan) return Rejection::outside;
+    if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return {Rejection::poor_ellipse, {}, {}};
+    auto scan = scan_ring(pyramid_, dot, library_.bits, library_.geometry, noise_, config_.max_unknown);
+    if (!scan) return {Rejection::outside, {}, {}};
     const DecodedRing ring = decoder_.decode(*scan);
-    if (trace_ != nullptr) trace_->decoded.push_back({dot.ellipse, *scan, ring});
-    if (!ring.accepted || !is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits)) return Rejection::no_code;
-    if (found != nullptr) {
-      const DetectedTarget target{
-          ring.id, {dot.ellipse.center.x(), dot.ellipse.center.y()}, dot.sigma_px, diameter, ring.distance};
-      found->push_back({target, dot.ellipse, ring.margin, ring.fit});
-    }
-    return Rejection::none;
+    if (trace_ != nullptr) trace_->decoded.push_back({dot, *scan, ring});
+    const bool accepted = ring.accepted && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits);
+    return {accepted ? Rejection::none : Rejection::no_code, std::move(*scan), ring};
   }
 
   /// Whether the place belongs to a target that is found: its dot or its ring.
@@ -224,6 +251,7 @@ class TargetSearch {
   const TargetLibrary& library_;
   RingDecoder decoder_;
   const DetectConfig& config_;
+  double noise_;
   DetectionTrace* trace_;
   std::vector<Found> found_;
 };

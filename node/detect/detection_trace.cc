@@ -76,8 +76,8 @@ cv::Mat draw_detections(const cv::Mat& image, const std::vector<DetectedTarget>&
         std::find_if(trace.decoded.begin(), trace.decoded.end(),
                      [&](const DetectionTrace::Decoded& d) { return d.ring.accepted && d.ring.id == target.id; });
     if (decoded != trace.decoded.end()) {
-      draw_ellipse(canvas, decoded->ellipse, 1.0, green);
-      draw_ellipse(canvas, decoded->ellipse, 3.2, green);
+      draw_ellipse(canvas, decoded->dot.ellipse, 1.0, green);
+      draw_ellipse(canvas, decoded->dot.ellipse, 3.2, green);
     }
     const cv::Point place(cvRound(target.center.x_px + 1.8 * target.dot_diameter_px), cvRound(target.center.y_px));
     cv::putText(canvas, std::to_string(target.id), place, cv::FONT_HERSHEY_SIMPLEX, 0.5, green, 1, cv::LINE_AA);

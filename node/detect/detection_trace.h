@@ -23,7 +23,7 @@ struct DetectionTrace {
     Rejection reason;
   };
   struct Decoded {
-    Ellipse ellipse;
+    FittedDot dot;
     RingScan scan;
     DecodedRing ring;
   };

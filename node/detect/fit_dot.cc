@@ -176,13 +176,16 @@ FittedDot from_level(const FittedDot& dot, int level) {
   full.blur_px *= scale;
   full.sigma_px *= scale;
   full.shading /= scale;
-  full.noise *= scale;  // a pixel of the level is the mean of scale^2 pixels
+
   return full;
 }
 
-std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start) {
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start, const LightAt& other_light) {
   const Ellipse& guess = start.ellipse;
-  const std::vector<Sample> samples = samples_of(image, guess);
+  std::vector<Sample> samples = samples_of(image, guess);
+  if (other_light) {
+    for (Sample& sample : samples) sample.grey -= other_light(guess.center + sample.p);
+  }
   if (samples.size() < parameters + 4) return std::nullopt;
   Dot dot{Eigen::Vector2d::Zero(), guess.shape, start.blur_px, start.black, start.contrast, Eigen::Vector2d::Zero()};
   NormalEquations equations;
@@ -207,7 +210,7 @@ std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start) 
   fitted.blur_px = dot.blur;
   fitted.black = dot.black;
   fitted.contrast = dot.contrast;
-  fitted.noise = noise;
+  fitted.residual = noise;
   fitted.sigma_px = std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
   if (!std::isfinite(fitted.sigma_px)) return std::nullopt;
   constexpr double significant = 4.0;  // standard deviations: the ring magnifies a wrong shading

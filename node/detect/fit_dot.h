@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "node/detect/ellipse.h"
@@ -13,7 +14,7 @@ struct FittedDot {
   double blur_px = 0.0;   ///< standard deviation of the edge's blur, the pixel's own width (1/12 px^2) included
   double black = 0.0;     ///< grey level of the ground
   double contrast = 0.0;  ///< white minus black at the centre
-  double noise = 0.0;     ///< standard deviation of a grey value about the model
+  double residual = 0.0;  ///< rms of the grey values about the model: the noise, and what is no dot
   double sigma_px = 0.0;  ///< standard deviation of each coordinate of the centre
   Eigen::Vector2d shading =
       Eigen::Vector2d::Zero();  ///< relative change of the light per px; zero where not significant
@@ -32,7 +33,10 @@ struct DotGuess {
 /// grey levels and shading are fitted together, pixels that do not fit (dirt, a cover) weigh less. The centre of a
 /// symmetric dot has no bias whatever the blur's shape is, and its standard deviation comes from the normal equations.
 /// Nothing when it does not converge near the guess. In place of the edge points of [A] 2.3.4.
-std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& guess);
+/// `other_light`, where given, is light at a place that is not the dot's (its ring's, as blur spreads it), and is taken
+/// off first.
+using LightAt = std::function<double(const Eigen::Vector2d&)>;
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& guess, const LightAt& other_light = {});
 
 /// The same dot in the px of level 0, from px of `level`.
 FittedDot from_level(const FittedDot& dot, int level);

@@ -1,5 +1,8 @@
 #include "node/detect/image_pyramid.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <opencv2/imgproc.hpp>
 
 namespace imprint {
@@ -15,6 +18,25 @@ ImagePyramid::ImagePyramid(const cv::Mat& image, int levels) {
     cv::resize(last(even), half, {}, 0.5, 0.5, cv::INTER_AREA);
     levels_.emplace_back(half);
   }
+}
+
+double image_noise(const GreyImage& image) {
+  constexpr double places = 30000.0;
+  constexpr double mask_norm = 6.0;                 // root of the sum of the mask's squares
+  constexpr double sigma_of_median = 1.0 / 0.6745;  // of the absolute value of a normal variable
+  const double area = static_cast<double>(image.width()) * image.height();
+  const int step = std::max(1, static_cast<int>(std::sqrt(area / places)));
+  std::vector<double> responses;
+  for (int y = 1; y + 1 < image.height(); y += step) {
+    for (int x = 1; x + 1 < image.width(); x += step) {
+      const auto row = [&](int v) { return image.pixel(x - 1, v) - 2.0 * image.pixel(x, v) + image.pixel(x + 1, v); };
+      responses.push_back(std::abs(row(y - 1) - 2.0 * row(y) + row(y + 1)));
+    }
+  }
+  if (responses.empty()) return 0.0;
+  const auto middle = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() / 2);
+  std::nth_element(responses.begin(), middle, responses.end());
+  return *middle / mask_norm * sigma_of_median;
 }
 
 }  // namespace imprint

@@ -134,7 +134,7 @@ double BitResponse::column_reading(double offset, int before, int bit, int after
 }
 
 std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
-                                  const TargetGeometry& geometry, double max_unknown) {
+                                  const TargetGeometry& geometry, double noise, double max_unknown) {
   const int count = bits * columns_per_bit;
   const std::vector<double> columns = scan_columns(pyramid, dot, count, geometry);
   const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
@@ -142,6 +142,7 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
   RingScan scan;
   const std::size_t first = first_column(columns, bits, &scan.deviation);
   for (std::size_t i = 0; i < columns.size(); ++i) scan.columns.push_back(columns[(first + i) % columns.size()]);
+  scan.first_angle = two_pi * static_cast<double>(first) / count;
   for (int bit = 0; bit < bits; ++bit) {
     const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
     scan.reading.push_back(read_bit(columns, begin).mean);
@@ -156,8 +157,28 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
   const double outer = row_radius(geometry, rows - 1);
   const double area =
       std::numbers::pi * axes.semi_major_px * axes.semi_minor_px * (outer * outer - inner * inner) / bits * 0.67;
-  scan.noise = dot.noise / dot.contrast / std::sqrt(std::max(1.0, area));
+  scan.noise = noise / dot.contrast / std::sqrt(std::max(1.0, area));
   return scan;
+}
+
+double ring_light_at(const Eigen::Vector2d& place, const FittedDot& dot, const RingScan& scan, std::uint32_t code,
+                     const TargetGeometry& geometry) {
+  const Eigen::Vector2d in_frame = frame_of(dot.ellipse).inverse() * (place - dot.ellipse.center);
+  const double radius = in_frame.norm();
+  if (radius < 1e-6) return 0.0;
+  const int bits = static_cast<int>(scan.response.size());
+  const double turn = (std::atan2(in_frame.y(), in_frame.x()) - scan.first_angle) / two_pi;
+  const double at = (turn - std::floor(turn)) * bits;  // in bits from the first one's beginning
+  const int bit = std::min(bits - 1, static_cast<int>(at));
+  const auto is_white = [&](int i) { return static_cast<int>((code >> (bits - 1 - (i + bits) % bits)) & 1U); };
+  BitResponse response = scan.response[static_cast<std::size_t>(bit)];
+  const double radial_sigma = dot.blur_px * (dot.ellipse.shape * (place - dot.ellipse.center)).norm() / radius;
+  const double inner = geometry.ring_inner_radius / geometry.dot_radius;
+  const double outer = geometry.ring_outer_radius / geometry.dot_radius;
+  response.floor = 0.0;
+  response.radial = normal_cdf((outer - radius) / radial_sigma) - normal_cdf((inner - radius) / radial_sigma);
+  response.angular_sigma *= 0.5 * (inner + outer) / std::max(radius, 0.5);
+  return dot.contrast * response.column_reading(at - bit - 0.5, is_white(bit - 1), is_white(bit), is_white(bit + 1));
 }
 
 Eigen::Vector2d light_slope(const FittedDot& dot) { return frame_of(dot.ellipse) * dot.shading; }

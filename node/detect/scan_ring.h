@@ -33,6 +33,7 @@ struct RingScan {
   std::vector<double> reading;  ///< 0: as black as the ground of the dot; 1: as white as the dot; NaN: outside
   std::vector<BitResponse> response;
   std::vector<Eigen::Vector2d> place;  ///< middle of each bit in the frame of the dot, where that is the unit circle
+  double first_angle = 0.0;            ///< where the first bit begins, in the frame of the dot
   double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
   std::vector<double> columns;         ///< mean reading of each column from the first bit's beginning on
   double deviation = 0.0;              ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
@@ -41,9 +42,14 @@ struct RingScan {
 /// Scans the ring of a dot densely (24 columns a bit, 7 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
 /// turns the columns so that the sum of the mean deviations within the bits is least. `dot` is in px of level 0; the
 /// scan takes the pyramid level whose pixels fit the dot's size, so that in large rings noise is averaged out.
-/// Nothing when more than `max_unknown` of the ring lies outside the image.
+/// `noise` is the image's. Nothing when more than `max_unknown` of the ring lies outside the image.
 std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
-                                  const TargetGeometry& geometry, double max_unknown);
+                                  const TargetGeometry& geometry, double noise, double max_unknown);
+
+/// Light of the ring of `code` (its first bit where the scan's is) at a place of the image, in grey levels: what blur
+/// carries of it over the edge of the dot.
+double ring_light_at(const Eigen::Vector2d& place, const FittedDot& dot, const RingScan& scan, std::uint32_t code,
+                     const TargetGeometry& geometry);
 
 /// The light's slope in the frame of the dot (logarithm per dot radius), as the shading over the dot tells it.
 Eigen::Vector2d light_slope(const FittedDot& dot);
