@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "node/segment/axis_lines.h"
+#include "node/segment/body_levels.h"
 #include "node/segment/body_path.h"
 #include "node/segment/rim_candidates.h"
 #include "node/segment/segment_config.h"
@@ -55,6 +56,28 @@ double rate_body(const BodyPath& path, const WorkingImage& working, const Segmen
     nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
   const double z = nearest / (config.center_reach * working.shorter_side_px);
   return path.mean_weight() * by_length * by_width / (1 + z * z);
+}
+
+// The body once more, now that its brightness is known: beams that pass behind it drop out, and it is followed to
+// where its brightness ends rather than to where both rims are last seen.
+BodyPath refine_body(const BodyPath& found, const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working,
+                     double max_offset_px, const SegmentConfig& config) {
+  const AxisLine line = fit_axis(found);
+  const double width = found.median_width_px();
+  const int middle = found.columns[found.columns.size() / 2].x_px;
+  const BodyLevels levels = measure_levels(working, line, width, middle, config.max_gap_diameters * width);
+  BodyPath refined = follow_body(weigh_by_levels(pairs, working, levels), working, line, max_offset_px,
+                                 2.0 * config.max_gap_diameters);
+  if (refined.length_px() < 0.5 * found.length_px()) return found;
+  const auto hold = [](RimPair pair) {
+    pair.weight = 0;
+    return pair;
+  };
+  if (levels.first_x_px < refined.columns.front().x_px)
+    refined.columns.insert(refined.columns.begin(), {levels.first_x_px, hold(refined.columns.front().pair)});
+  if (levels.last_x_px > refined.columns.back().x_px)
+    refined.columns.push_back({levels.last_x_px, hold(refined.columns.back().pair)});
+  return refined;
 }
 
 struct RimSample {
@@ -109,7 +132,7 @@ Segmentation describe(const BodyPath& path, const WorkingImage& working, const S
   std::sort(samples.begin(), samples.end(),
             [](const RimSample& a, const RimSample& b) { return a.station_px < b.station_px; });
   const double width = path.median_width_px() * working.reduction;
-  resample_rims(samples, std::max(8.0 * working.reduction, config.max_gap_diameters * width), out);
+  resample_rims(samples, std::max(8.0 * working.reduction, 2.0 * config.max_gap_diameters * width), out);
   out.score = static_cast<double>(path.columns.size()) / path.length_px();
   return out;
 }
@@ -177,6 +200,7 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
         "no forging: the longest body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths "
         "is needed",
         longest.length_px() * r, longest.median_width_px() * r, config.min_elongation);
+  best = refine_body(best, pairs, working, max_offset, config);
   Segmentation found = describe(best, working, config);
   if (found.score < config.min_score)
     return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",

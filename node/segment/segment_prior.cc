@@ -41,9 +41,12 @@ Result<SegmentPrior> make_segment_prior(const CameraModel& camera, const CameraP
   const ObservedPoint b = project(camera, middle_cam_mm + half_mm * axis_cam);
   const double length = std::hypot(b.x_px - a.x_px, b.y_px - a.y_px);
 
+  // To the right, or down where it is upright, so that the upper rim is the upper one of the image.
+  const double dx = b.x_px - a.x_px, dy = b.y_px - a.y_px;
+  const double sign = std::abs(dx) > 1e-6 * length ? std::copysign(1.0, dx) : std::copysign(1.0, dy);
   SegmentPrior prior;
-  prior.direction_x = (b.x_px - a.x_px) / length;
-  prior.direction_y = (b.y_px - a.y_px) / length;
+  prior.direction_x = sign * dx / length;
+  prior.direction_y = sign * dy / length;
   prior.diameter_min_px = camera.focal_length_px * forging.diameter_min_mm / (kFarthest * depth_mm);
   prior.diameter_max_px = camera.focal_length_px * forging.diameter_max_mm / (kNearest * depth_mm);
   prior.likely_min_px = camera.focal_length_px * forging.diameter_min_mm / depth_mm;

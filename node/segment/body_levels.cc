@@ -1,0 +1,116 @@
+#include "node/segment/body_levels.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace imprint {
+namespace {
+
+float quantile(std::vector<float>& values, double share) {
+  if (values.empty()) return 0.0F;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// The rows of one column between two heights, as far as the camera saw something there.
+void gather(const WorkingImage& working, int x, double from, double to, std::vector<float>& values) {
+  const int first = std::max(0, static_cast<int>(std::ceil(from)));
+  const int last = std::min(working.intensity.rows - 1, static_cast<int>(std::floor(to)));
+  for (int y = first; y <= last; ++y)
+    if (working.valid(y, x)) values.push_back(working.intensity(y, x));
+}
+
+// Median over a few columns: sparks and single patches of scale go.
+std::vector<float> smoothed(const std::vector<float>& values, int half) {
+  std::vector<float> result(values.size()), window;
+  const int n = static_cast<int>(values.size());
+  for (int x = 0; x < n; ++x) {
+    window.assign(values.begin() + std::max(0, x - half), values.begin() + std::min(n, x + half + 1));
+    result[static_cast<std::size_t>(x)] = quantile(window, 0.5);
+  }
+  return result;
+}
+
+// The last column of the body when walking from `from` in steps of `step`.
+int walk(const BodyLevels& levels, int from, int step, double max_gap_px) {
+  constexpr float kStaysAbove = 0.6F, kMemory = 0.05F;  // of about 20 columns
+  const int n = static_cast<int>(levels.body.size());
+  float brightness = levels.body[static_cast<std::size_t>(from)];
+  int last = from;
+  for (int x = from; x >= 0 && x < n && std::abs(x - last) <= max_gap_px; x += step) {
+    const float body = levels.body[static_cast<std::size_t>(x)], ground = levels.ground[static_cast<std::size_t>(x)];
+    if (body - ground < kStaysAbove * (brightness - ground)) continue;
+    brightness += kMemory * (body - brightness);
+    last = x;
+  }
+  return last;
+}
+
+float mean(const WorkingImage& working, int x, double from, double to) {
+  std::vector<float> values;
+  gather(working, x, from, to, values);
+  float sum = 0;
+  for (const float value : values) sum += value;
+  return values.empty() ? 0.0F : sum / static_cast<float>(values.size());
+}
+
+// 0 to 1: the side `inner` of a rim belongs to the body and the side `outer` does not.
+float rim_weight(float inner, float outer, float body, float ground) {
+  const float contrast = std::max(body - ground, 1e-4F);
+  const float belongs = std::clamp(((inner - ground) / contrast - 0.45F) / 0.3F, 0.0F, 1.0F);
+  const float leaves = std::clamp((0.9F - (outer - ground) / contrast) / 0.3F, 0.0F, 1.0F);
+  return belongs * leaves;
+}
+
+}  // namespace
+
+BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
+                          double max_gap_px) {
+  constexpr double kStrip = 0.3;                        // of the width, to both sides of the axis: inside every step
+  constexpr double kGroundFrom = 0.8, kGroundTo = 1.6;  // of the width: outside every step
+  BodyLevels levels;
+  std::vector<float> values;
+  for (int x = 0; x < working.intensity.cols; ++x) {
+    const double y = line.y_px(x);
+    values.clear();
+    gather(working, x, y - kStrip * width_px, y + kStrip * width_px, values);
+    levels.body.push_back(quantile(values, 0.7));
+    values.clear();
+    gather(working, x, y - kGroundTo * width_px, y - kGroundFrom * width_px, values);
+    gather(working, x, y + kGroundFrom * width_px, y + kGroundTo * width_px, values);
+    levels.ground.push_back(quantile(values, 0.3));
+  }
+  levels.body = smoothed(levels.body, 2);
+  levels.ground = smoothed(levels.ground, 8);
+  levels.first_x_px = walk(levels, inside_x_px, -1, max_gap_px);
+  levels.last_x_px = walk(levels, inside_x_px, 1, max_gap_px);
+  // Over scale the body is as bright as beside it.
+  for (int x = levels.first_x_px + 1; x < levels.last_x_px; ++x) {
+    auto& body = levels.body[static_cast<std::size_t>(x)];
+    const float ground = levels.ground[static_cast<std::size_t>(x)],
+                before = levels.body[static_cast<std::size_t>(x - 1)];
+    if (body - ground < 0.6F * (before - ground)) body = before;
+  }
+  return levels;
+}
+
+std::vector<std::vector<RimPair>> weigh_by_levels(const std::vector<std::vector<RimPair>>& pairs,
+                                                  const WorkingImage& working, const BodyLevels& levels) {
+  constexpr double kNear = 1.5, kFar = 4.0;  // reduced px off the rim: clear of its blur, still beside it
+  std::vector<std::vector<RimPair>> weighed(pairs.size());
+  for (int x = std::max(0, levels.first_x_px); x <= levels.last_x_px; ++x) {
+    const auto column = static_cast<std::size_t>(x);
+    for (RimPair pair : pairs[column]) {
+      const float body = levels.body[column], ground = levels.ground[column];
+      pair.weight *= rim_weight(mean(working, x, pair.upper_px + kNear, pair.upper_px + kFar),
+                                mean(working, x, pair.upper_px - kFar, pair.upper_px - kNear), body, ground) *
+                     rim_weight(mean(working, x, pair.lower_px - kFar, pair.lower_px - kNear),
+                                mean(working, x, pair.lower_px + kNear, pair.lower_px + kFar), body, ground);
+      if (pair.weight > 0.01F) weighed[column].push_back(pair);
+    }
+  }
+  return weighed;
+}
+
+}  // namespace imprint
