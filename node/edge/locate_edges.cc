@@ -24,9 +24,9 @@ constexpr std::array<std::pair<std::string_view, EdgeMethod>, 7> kMethods{{{"bes
 EndSearch describe_end(const Segmentation& s, bool at_start) {
   EndSearch search;
   search.at_start = at_start;
-  const std::size_t n = s.upper_offset_px.size(), take = std::min<std::size_t>(n, 200);
+  const std::size_t n = s.upper_offset_px.size();
   std::vector<double> widths, middles;
-  for (std::size_t k = 0; k < take; ++k) {
+  for (std::size_t k = 0; k < n; ++k) {  // some station has both rims: the caller made sure
     const std::size_t i = at_start ? k : n - 1 - k;
     const double upper = s.upper_offset_px[i], lower = s.lower_offset_px[i];
     if (std::isnan(upper) || std::isnan(lower)) continue;

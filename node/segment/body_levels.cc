@@ -63,6 +63,22 @@ float rim_weight(float inner, float outer, float body, float ground) {
   return belongs * leaves;
 }
 
+// Distance from the axis to where the body's brightness ends on one side of a column; darker stretches up to `gap_px`
+// are scale.
+double reach(const WorkingImage& working, const BodyLevels& levels, int x, double axis_y, int step, double limit_px,
+             double gap_px) {
+  const auto column = static_cast<std::size_t>(x);
+  const float edge = levels.ground[column] + 0.6F * (levels.body[column] - levels.ground[column]);
+  const int from = static_cast<int>(std::lround(axis_y));
+  double last = 0.0;
+  for (int k = 0; k <= limit_px && k - last <= gap_px; ++k) {
+    const int y = from + step * k;
+    if (y < 0 || y >= working.intensity.rows) break;
+    if (working.intensity(y, x) > edge) last = k;
+  }
+  return last + 0.5;
+}
+
 }  // namespace
 
 BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
@@ -93,6 +109,31 @@ BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, dou
     if (body - ground < 0.6F * (before - ground)) body = before;
   }
   return levels;
+}
+
+std::vector<RimPair> rims_by_brightness(const WorkingImage& working, const AxisLine& line, const BodyLevels& levels,
+                                        double width_px) {
+  constexpr int kHalfWindow = 10;    // columns: longer than a spark, shorter than a fitting
+  constexpr double kOutward = 0.75;  // quantile over the window: scale only ever hides the rim
+  const int n = levels.last_x_px - levels.first_x_px + 1;
+  std::vector<float> above, below, window;
+  for (int x = levels.first_x_px; x <= levels.last_x_px; ++x) {
+    above.push_back(static_cast<float>(reach(working, levels, x, line.y_px(x), -1, width_px, 0.25 * width_px)));
+    below.push_back(static_cast<float>(reach(working, levels, x, line.y_px(x), 1, width_px, 0.25 * width_px)));
+  }
+  std::vector<RimPair> rims;
+  for (int k = 0; k < n; ++k) {
+    const auto around = [&](const std::vector<float>& side) {
+      window.assign(side.begin() + std::max(0, k - kHalfWindow), side.begin() + std::min(n, k + kHalfWindow + 1));
+      return quantile(window, kOutward);
+    };
+    const auto axis_y = static_cast<float>(line.y_px(levels.first_x_px + k));
+    RimPair pair;
+    pair.upper_px = axis_y - around(above);
+    pair.lower_px = axis_y + around(below);
+    rims.push_back(pair);
+  }
+  return rims;
 }
 
 std::vector<std::vector<RimPair>> weigh_by_levels(const std::vector<std::vector<RimPair>>& pairs,

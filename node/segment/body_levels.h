@@ -19,6 +19,11 @@ struct BodyLevels {
 BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
                           double max_gap_px);
 
+/// Where the body's brightness ends on both sides, for each of its columns: rough, but there where a rim has no edge of
+/// its own. Weights are 0.
+std::vector<RimPair> rims_by_brightness(const WorkingImage& working, const AxisLine& line, const BodyLevels& levels,
+                                        double width_px);
+
 /// Pairs weighed by what the levels say: a rim's inner side is as bright as the body there, which the edge of a beam
 /// behind it is not, and its outer side is darker. Pairs outside the body's columns go.
 std::vector<std::vector<RimPair>> weigh_by_levels(const std::vector<std::vector<RimPair>>& pairs,

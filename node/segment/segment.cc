@@ -58,6 +58,27 @@ double rate_body(const BodyPath& path, const WorkingImage& working, const Segmen
   return path.mean_weight() * by_length * by_width / (1 + z * z);
 }
 
+// Columns without a pair, in long gaps and towards the ends, get the rough rims.
+void fill_gaps(BodyPath& path, const std::vector<RimPair>& rough, int first_x_px) {
+  constexpr int kBridged = 8;  // columns over which a straight line serves
+  std::vector<BodyPath::Column> filled;
+  int before = first_x_px - kBridged - 1;
+  const auto fill_to = [&](int next) {
+    if (next - before <= kBridged) return;
+    for (int x = before + 1; x < next; ++x) {
+      const int k = x - first_x_px;
+      if (k >= 0 && k < static_cast<int>(rough.size())) filled.push_back({x, rough[static_cast<std::size_t>(k)]});
+    }
+  };
+  for (const auto& column : path.columns) {
+    fill_to(column.x_px);
+    filled.push_back(column);
+    before = column.x_px;
+  }
+  fill_to(first_x_px + static_cast<int>(rough.size()) + kBridged);
+  path.columns = std::move(filled);
+}
+
 // The body once more, now that its brightness is known: beams that pass behind it drop out, and it is followed to
 // where its brightness ends rather than to where both rims are last seen.
 BodyPath refine_body(const BodyPath& found, const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working,
@@ -69,14 +90,8 @@ BodyPath refine_body(const BodyPath& found, const std::vector<std::vector<RimPai
   BodyPath refined = follow_body(weigh_by_levels(pairs, working, levels), working, line, max_offset_px,
                                  2.0 * config.max_gap_diameters);
   if (refined.length_px() < 0.5 * found.length_px()) return found;
-  const auto hold = [](RimPair pair) {
-    pair.weight = 0;
-    return pair;
-  };
-  if (levels.first_x_px < refined.columns.front().x_px)
-    refined.columns.insert(refined.columns.begin(), {levels.first_x_px, hold(refined.columns.front().pair)});
-  if (levels.last_x_px > refined.columns.back().x_px)
-    refined.columns.push_back({levels.last_x_px, hold(refined.columns.back().pair)});
+  const std::vector<RimPair> rough = rims_by_brightness(working, line, levels, width);
+  fill_gaps(refined, rough, levels.first_x_px);
   return refined;
 }
 
