@@ -22,19 +22,20 @@ double grey_at(const cv::Mat& image, const ObservedPoint& p, bool invert) {
   return invert ? 1.0 - value : value;
 }
 
-// Median over a band about the axis at one station; negative when the axis has left the image.
+// Upper quartile over a broad band about the axis at one station, so that scale on a part of it does not hide the body;
+// negative when the axis has left the image.
 double band_level(const cv::Mat& image, const SilhouetteFrame& frame, double station, const EndSearch& search,
                   bool invert) {
   if (grey_at(image, frame.at(station, search.axis_offset_px), invert) < 0) return -1.0;
   std::vector<double> values;
-  for (int k = -6; k <= 6; ++k) {
+  for (int k = -10; k <= 10; ++k) {
     const double value =
-        grey_at(image, frame.at(station, search.axis_offset_px + 0.025 * k * search.diameter_px), invert);
+        grey_at(image, frame.at(station, search.axis_offset_px + 0.035 * k * search.diameter_px), invert);
     if (value >= 0) values.push_back(value);
   }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(3 * values.size() / 4);
+  std::nth_element(values.begin(), quartile, values.end());
+  return *quartile;
 }
 
 struct ArcPoint {
@@ -87,7 +88,7 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
   const bool invert = polarity == Polarity::dark;
   const double outward = search.at_start ? -1.0 : 1.0;
   const int inside_px = static_cast<int>(0.5 * search.diameter_px),
-            outside_px = static_cast<int>(2.0 * search.diameter_px);
+            outside_px = static_cast<int>(1.2 * search.diameter_px);
   std::vector<double> body;
   for (int k = -2 * inside_px; k < -inside_px / 2; ++k) {
     const double level = band_level(image, frame, search.station_px + outward * k, search, invert);
@@ -103,7 +104,7 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
   }
   // Scale on the surface is a dark stretch too, but the body comes back behind it.
   const double threshold = 0.5 * (*middle + darkest);
-  const int longest_dark = std::max(8, static_cast<int>(0.25 * search.diameter_px));
+  const int longest_dark = std::max(8, static_cast<int>(0.4 * search.diameter_px));
   int dark = 0;
   for (int k = -inside_px; k <= outside_px; ++k) {
     const double level = band_level(image, frame, search.station_px + outward * k, search, invert);

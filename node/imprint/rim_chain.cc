@@ -34,20 +34,25 @@ std::vector<Stretch> cut_into_stretches(const RimCurve& rim, const std::vector<d
     begin = i;
     if (!at_head || !at_tail || s.last - s.first < 4) continue;
     s.head = *at_head, s.tail = *at_tail;
+    // A forging's rim runs along its axis: what runs askew is a shoulder or the border of scale.
+    const double slope = (s.tail.c0 - s.head.c0) / std::max(1.0, s.to - s.from);
+    s.worth *= std::clamp((0.3 - std::abs(slope)) / 0.2, 0.0, 1.0);
     stretches.push_back(s);
   }
   return stretches;
 }
 
-// Median of the offsets near a station; nothing when fewer than four.
-std::optional<double> level_near(const RimCurve& rim, double from, double to) {
-  std::vector<double> offsets;
-  const SampleRange range = samples_near(rim, 0.5 * (from + to), 0.5 * (to - from));
-  for (std::size_t i = range.first; i < range.last; ++i) offsets.push_back(rim[i].offset_px);
-  if (offsets.size() < 4) return std::nullopt;
-  const auto middle = offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2);
-  std::nth_element(offsets.begin(), middle, offsets.end());
-  return *middle;
+// How far a rim steps between two stations: its line after them less its line before them, in the middle. Nothing when
+// it was not seen on both sides.
+std::optional<double> step_between(const RimCurve& rim, double from, double to) {
+  const SampleRange before = samples_near(rim, from - 0.5 * kReachPx, 0.5 * kReachPx);
+  const SampleRange after = samples_near(rim, to + 0.5 * kReachPx, 0.5 * kReachPx);
+  if (before.last - before.first < 6 || after.last - after.first < 6) return std::nullopt;
+  const double middle = 0.5 * (from + to);
+  const auto left = fit_parabola(rim.data() + before.first, rim.data() + before.last, from, 1);
+  const auto right = fit_parabola(rim.data() + after.first, rim.data() + after.last, to, 1);
+  if (!left || !right) return std::nullopt;
+  return right->at(middle) - left->at(middle);
 }
 
 // How far b lies off a's course, px: the mean of looking ahead from a and back from b. A short stretch's slope is
@@ -70,16 +75,21 @@ void keep_likeliest_course(RimCurve& rim, const std::vector<double>& cuts, const
   if (stretches.empty()) return;
   const double price = std::max(60.0, config.lone_step_price * diameter_px);
   const double free_px = std::max(0.3, 4 * noise_px);
+  // What noise and haze make of the slope of a stretch's end.
+  const auto slope_tolerance = [&](const Stretch& s) {
+    const double n = std::min(kReachPx, static_cast<double>(s.last - s.first));
+    return 0.05 + 3 * std::max(noise_px, 0.05) * std::sqrt(12 / (n * n * n));
+  };
   const auto cost = [&](const Stretch& a, const Stretch& b) {
     const double gap = b.from - a.to;
     const double off = mismatch_px(a, b);
     const double excess = std::max(0.0, std::abs(off) - free_px - 0.01 * gap);
-    double step = price * std::min(1.0, excess / 1.5);
-    if (excess > 0) {
+    const double turn = std::max(0.0, std::abs(b.head.c1 - a.tail.c1) - slope_tolerance(a) - slope_tolerance(b));
+    double step = price * std::min(1.0, excess / 1.5 + turn / 0.3);
+    if (step > 0) {
       // Shared with the other rim: it moves in or out by about as much over the same gap.
-      const auto before = level_near(other, a.to - kReachPx, a.to),
-                 after = level_near(other, b.from, b.from + kReachPx);
-      if (before && after && std::abs(*after - *before + off) < 0.35 * std::abs(off) + 0.5) step *= 0.15;
+      const auto shared = step_between(other, a.to, b.from);
+      if (shared && -*shared * off > 0.5 * off * off && -*shared * off < 2 * off * off) step *= 0.15;
     }
     return step;
   };

@@ -47,23 +47,24 @@ double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums
 }
 
 // Weights by contrast: one half for a third of the step of the strongest pairs.
-void weigh_contrast(std::vector<std::vector<RimPair>>& pairs) {
+void weigh_contrast(RimPairs& pairs) {
   std::vector<float> steps;
-  for (const auto& column : pairs)
+  for (const auto& column : pairs.columns)
     for (const RimPair& pair : column) steps.push_back(pair.step);
   if (steps.empty()) return;
   const auto high = steps.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(steps.size() - 1));
   std::nth_element(steps.begin(), high, steps.end());
-  const float half = *high / 3;
-  for (auto& column : pairs)
-    for (RimPair& pair : column) pair.weight *= pair.step / (pair.step + half);
+  pairs.half_step = *high / 3;
+  for (auto& column : pairs.columns)
+    for (RimPair& pair : column) pair.weight *= pair.step / (pair.step + pairs.half_step);
 }
 
 }  // namespace
 
-std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px,
-                                            double max_width_px) {
-  std::vector<std::vector<RimPair>> pairs(rims.upper.size());
+RimPairs pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px, double max_width_px) {
+  RimPairs pairs;
+  pairs.columns.resize(rims.upper.size());
+  pairs.min_width_px = min_width_px, pairs.max_width_px = max_width_px;
   for (std::size_t x = 0; x < rims.upper.size(); ++x) {
     if (rims.upper[x].empty() || rims.lower[x].empty()) continue;
     const ColumnSums sums(working.intensity, static_cast<int>(x));
@@ -73,7 +74,7 @@ std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const R
         if (width < min_width_px || width > max_width_px) continue;
         RimPair pair{upper.y_px, lower.y_px, std::sqrt(upper.strength * lower.strength)};
         pair.weight *= static_cast<float>(inside_weight(working.intensity, static_cast<int>(x), sums, pair));
-        if (pair.weight > 0.05F) pairs[x].push_back(pair);
+        if (pair.weight > 0.05F) pairs.columns[x].push_back(pair);
       }
     }
   }
@@ -81,12 +82,50 @@ std::vector<std::vector<RimPair>> pair_rims(const WorkingImage& working, const R
   return pairs;
 }
 
-std::vector<AxisLine> vote_axis_lines(const std::vector<std::vector<RimPair>>& pairs, int height_px,
-                                      double separation_px, const SegmentConfig& config) {
+RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, const RimCandidates& rims,
+                          const AxisLine& line, double max_offset_px, int max_count) {
+  constexpr float kLoneRim = 0.4F;  // one rim is less than half of a pair
+  RimPairs near;
+  near.columns.resize(pairs.columns.size());
+  near.min_width_px = pairs.min_width_px, near.max_width_px = pairs.max_width_px, near.half_step = pairs.half_step;
+  for (std::size_t x = 0; x < pairs.columns.size(); ++x) {
+    auto& column = near.columns[x];
+    const auto axis = static_cast<float>(line.y_px(static_cast<double>(x)));
+    for (const RimPair& pair : pairs.columns[x])
+      if (std::abs(pair.middle_px() - axis) <= max_offset_px) column.push_back(pair);
+    if (rims.upper[x].empty() && rims.lower[x].empty()) continue;
+    const ColumnSums sums(working.intensity, static_cast<int>(x));
+    for (const bool upper : {true, false}) {
+      for (const RimCandidate& rim : upper ? rims.upper[x] : rims.lower[x]) {
+        const float inward = upper ? 1.0F : -1.0F, half = inward * (axis - rim.y_px);
+        if (2 * half < pairs.min_width_px || 2 * half > pairs.max_width_px) continue;
+        const auto band = [&](float from, float to) {
+          const float a = rim.y_px + inward * from, b = rim.y_px + inward * to;
+          return static_cast<float>(sums.mean(std::min(a, b), std::max(a, b)));
+        };
+        const float outside = band(-4, -2), step = band(2, 4) - outside;
+        if (step <= 0) continue;
+        const float body = band(0.2F * half, half) - outside;  // goes on to the axis
+        const float inside = std::clamp(body / step, 0.0F, 1.0F);
+        RimPair pair{upper ? rim.y_px : 2 * axis - rim.y_px, upper ? 2 * axis - rim.y_px : rim.y_px, 0, step, false};
+        pair.weight = kLoneRim * rim.strength * inside * step / (step + pairs.half_step);
+        if (pair.weight > 0.03F) column.push_back(pair);
+      }
+    }
+    if (column.size() <= static_cast<std::size_t>(max_count)) continue;
+    std::nth_element(column.begin(), column.begin() + max_count, column.end(),
+                     [](const RimPair& a, const RimPair& b) { return a.weight > b.weight; });
+    column.resize(static_cast<std::size_t>(max_count));
+  }
+  return near;
+}
+
+std::vector<AxisLine> vote_axis_lines(const RimPairs& pairs, int height_px, double separation_px,
+                                      const SegmentConfig& config) {
   constexpr double kBinPx = 2.0, kAngleStepDeg = 0.5;
   const int half_angles = static_cast<int>(std::ceil(config.max_tilt_deg / kAngleStepDeg));
   const int angles = 2 * half_angles + 1;
-  const double x0 = 0.5 * static_cast<double>(pairs.size());
+  const double x0 = 0.5 * static_cast<double>(pairs.columns.size());
   const double margin = x0 * std::tan(config.max_tilt_deg * std::numbers::pi / 180);
   const int bins = static_cast<int>((height_px + 2 * margin) / kBinPx) + 2;
 
@@ -98,8 +137,8 @@ std::vector<AxisLine> vote_axis_lines(const std::vector<std::vector<RimPair>>& p
   std::vector<double> slopes(static_cast<std::size_t>(angles));
   for (int a = 0; a < angles; ++a)
     slopes[static_cast<std::size_t>(a)] = std::tan((a - half_angles) * kAngleStepDeg * std::numbers::pi / 180);
-  for (std::size_t x = 0; x < pairs.size(); ++x) {
-    for (const RimPair& pair : pairs[x]) {
+  for (std::size_t x = 0; x < pairs.columns.size(); ++x) {
+    for (const RimPair& pair : pairs.columns[x]) {
       for (int a = 0; a < angles; ++a) {
         const double y = pair.middle_px() - slopes[static_cast<std::size_t>(a)] * (static_cast<double>(x) - x0);
         const int bin = static_cast<int>((y + margin) / kBinPx);

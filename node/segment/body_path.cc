@@ -35,13 +35,13 @@ bool inside_goes_on(const cv::Mat_<float>& image, const RimPair& a, int ax, cons
     std::nth_element(values.begin(), quartile, values.end());
     return *quartile;
   };
-  const auto outside_level = [&](int x, const RimPair& pair) {
-    const int above = std::clamp(static_cast<int>(pair.upper_px) - 4, 0, image.rows - 1);
-    const int below = std::clamp(static_cast<int>(pair.lower_px) + 4, 0, image.rows - 1);
-    return std::max(image(above, x), image(below, x));
-  };
+  // The second darkest of the four sides: a lamp or plate may touch the body anywhere.
+  const auto row = [&](double y) { return std::clamp(static_cast<int>(y), 0, image.rows - 1); };
+  std::array<float, 4> outside{image(row(a.upper_px - 4), ax), image(row(a.lower_px + 4), ax),
+                               image(row(b.upper_px - 4), bx), image(row(b.lower_px + 4), bx)};
+  std::sort(outside.begin(), outside.end());
   const double body = std::min(body_level(ax, a), body_level(bx, b));
-  const double threshold = 0.5 * (body + std::max(outside_level(ax, a), outside_level(bx, b)));
+  const double threshold = 0.5 * (body + outside[1]);
   int there = 0, count = 0;
   for (int x = ax + 1; x < bx; ++x, ++count) {
     const double t = static_cast<double>(x - ax) / (bx - ax);
@@ -70,8 +70,9 @@ double BodyPath::mean_weight() const {
   return sum / std::max(1, length_px());
 }
 
-BodyPath follow_body(const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working, const AxisLine& line,
-                     double max_offset_px, double max_gap_widths) {
+BodyPath follow_body(const RimPairs& rim_pairs, const WorkingImage& working, const AxisLine& line, double max_offset_px,
+                     double max_gap_widths) {
+  const auto& pairs = rim_pairs.columns;
   std::vector<int> reach{1, 2, 3, 4};
   double widest = 0;
   for (const auto& column : pairs)

@@ -23,7 +23,7 @@ struct BodyPath {
 
 /// The best chain of rim pairs near `line` (Viterbi along the columns). Widths may jump (steps of a forging) at a
 /// fixed cost, the middle may hardly; interruptions are bridged up to `max_gap_widths` widths where the inside goes on.
-BodyPath follow_body(const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working, const AxisLine& line,
-                     double max_offset_px, double max_gap_widths);
+BodyPath follow_body(const RimPairs& pairs, const WorkingImage& working, const AxisLine& line, double max_offset_px,
+                     double max_gap_widths);
 
 }  // namespace imprint

@@ -42,9 +42,10 @@ cv::Mat_<unsigned char> clean_mask(const cv::Mat& weak, const cv::Mat& strong, i
   return mask;
 }
 
-// Ridge points of +-gy along each column, the strongest ones.
+// Ridge points of +-gy along each column, the strongest ones. Strength is one half for a gradient of `least` plus a
+// third of what the image's strong edges have.
 std::vector<std::vector<RimCandidate>> ridges(const cv::Mat_<float>& gy, float sign,
-                                              const cv::Mat_<unsigned char>& mask, double scale, int max_count) {
+                                              const cv::Mat_<unsigned char>& mask, double least, int max_count) {
   std::vector<std::vector<RimCandidate>> columns(static_cast<std::size_t>(gy.cols));
   for (int y = 1; y + 1 < gy.rows; ++y) {
     const float *above = gy[y - 1], *here = gy[y], *below = gy[y + 1];
@@ -54,11 +55,18 @@ std::vector<std::vector<RimCandidate>> ridges(const cv::Mat_<float>& gy, float s
       if (!(b > a && b >= c)) continue;
       const float bend = a - 2 * b + c;
       const float shift = bend < 0 ? std::clamp(0.5F * (a - c) / bend, -0.5F, 0.5F) : 0.0F;
-      columns[static_cast<std::size_t>(x)].push_back(
-          {static_cast<float>(y) + shift, static_cast<float>(b / (b + scale))});
+      columns[static_cast<std::size_t>(x)].push_back({static_cast<float>(y) + shift, b});
     }
   }
+  std::vector<float> gradients;
+  for (const auto& column : columns)
+    for (const RimCandidate& c : column) gradients.push_back(c.strength);
+  if (gradients.empty()) return columns;
+  const auto strong = gradients.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(gradients.size() - 1));
+  std::nth_element(gradients.begin(), strong, gradients.end());
+  const float half = static_cast<float>(least) + *strong / 3;
   for (auto& column : columns) {
+    for (RimCandidate& c : column) c.strength /= c.strength + half;
     if (column.size() <= static_cast<std::size_t>(max_count)) continue;
     std::nth_element(column.begin(), column.begin() + max_count, column.end(),
                      [](const RimCandidate& p, const RimCandidate& q) { return p.strength > q.strength; });

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "node/segment/axis_lines.h"
-#include "node/segment/body_levels.h"
 #include "node/segment/body_path.h"
 #include "node/segment/rim_candidates.h"
 #include "node/segment/segment_config.h"
@@ -36,12 +35,11 @@ AxisLine fit_axis(const BodyPath& path) {
 }
 
 // How well a body fits what is looked for, 0 to 1: seen and bright along its length, elongated, of a likely width, and
-// near where the cameras of a rig are pointed. Zero when it is too short to be told from a plate.
+// near where the cameras of a rig are pointed.
 double rate_body(const BodyPath& path, const WorkingImage& working, const SegmentPrior& prior,
                  const SegmentConfig& config) {
   if (path.empty()) return 0.0;
   const double width = path.median_width_px(), elongation = path.length_px() / std::max(1.0, width);
-  if (elongation < config.min_elongation) return 0.0;
   const double by_length = std::min(1.0, elongation / config.full_elongation);
 
   const double width_px = width * working.reduction;
@@ -58,41 +56,33 @@ double rate_body(const BodyPath& path, const WorkingImage& working, const Segmen
   return path.mean_weight() * by_length * by_width / (1 + z * z);
 }
 
-// Columns without a pair, in long gaps and towards the ends, get the rough rims.
-void fill_gaps(BodyPath& path, const std::vector<RimPair>& rough, int first_x_px) {
-  constexpr int kBridged = 8;  // columns over which a straight line serves
-  std::vector<BodyPath::Column> filled;
-  int before = first_x_px - kBridged - 1;
-  const auto fill_to = [&](int next) {
-    if (next - before <= kBridged) return;
-    for (int x = before + 1; x < next; ++x) {
-      const int k = x - first_x_px;
-      if (k >= 0 && k < static_cast<int>(rough.size())) filled.push_back({x, rough[static_cast<std::size_t>(k)]});
-    }
+// The body that fits best: the lines with the most votes are followed on their full pairs; the best of these again
+// about their own axis, where one rim alone will do.
+BodyPath find_body(const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
+                   const SegmentPrior& prior, double max_offset_px, const SegmentConfig& config) {
+  constexpr std::size_t kFollowedTwice = 3;
+  struct Rated {
+    BodyPath path;
+    double rating;
   };
-  for (const auto& column : path.columns) {
-    fill_to(column.x_px);
-    filled.push_back(column);
-    before = column.x_px;
+  std::vector<Rated> bodies;
+  const double separation_px = 0.3 * pairs.min_width_px;
+  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, separation_px, config)) {
+    BodyPath path = follow_body(pairs, working, line, max_offset_px, config.max_gap_diameters);
+    const double rating = rate_body(path, working, prior, config);
+    if (!path.empty()) bodies.push_back({std::move(path), rating});
   }
-  fill_to(first_x_px + static_cast<int>(rough.size()) + kBridged);
-  path.columns = std::move(filled);
-}
-
-// The body once more, now that its brightness is known: beams that pass behind it drop out, and it is followed to
-// where its brightness ends rather than to where both rims are last seen.
-BodyPath refine_body(const BodyPath& found, const std::vector<std::vector<RimPair>>& pairs, const WorkingImage& working,
-                     double max_offset_px, const SegmentConfig& config) {
-  const AxisLine line = fit_axis(found);
-  const double width = found.median_width_px();
-  const int middle = found.columns[found.columns.size() / 2].x_px;
-  const BodyLevels levels = measure_levels(working, line, width, middle, config.max_gap_diameters * width);
-  BodyPath refined = follow_body(weigh_by_levels(pairs, working, levels), working, line, max_offset_px,
-                                 2.0 * config.max_gap_diameters);
-  if (refined.length_px() < 0.5 * found.length_px()) return found;
-  const std::vector<RimPair> rough = rims_by_brightness(working, line, levels, width);
-  fill_gaps(refined, rough, levels.first_x_px);
-  return refined;
+  const auto better = [](const Rated& a, const Rated& b) { return a.rating > b.rating; };
+  std::sort(bodies.begin(), bodies.end(), better);
+  bodies.resize(std::min(bodies.size(), kFollowedTwice));
+  for (Rated& body : bodies) {
+    const AxisLine axis = fit_axis(body.path);
+    const RimPairs near = pairs_about_axis(pairs, working, rims, axis, max_offset_px, config.max_rims_per_column);
+    body.path = follow_body(near, working, axis, max_offset_px, config.max_gap_diameters);
+    body.rating = rate_body(body.path, working, prior, config);
+  }
+  const auto best = std::min_element(bodies.begin(), bodies.end(), better);
+  return best == bodies.end() ? BodyPath{} : best->path;
 }
 
 struct RimSample {
@@ -147,8 +137,10 @@ Segmentation describe(const BodyPath& path, const WorkingImage& working, const S
   std::sort(samples.begin(), samples.end(),
             [](const RimSample& a, const RimSample& b) { return a.station_px < b.station_px; });
   const double width = path.median_width_px() * working.reduction;
-  resample_rims(samples, std::max(8.0 * working.reduction, 2.0 * config.max_gap_diameters * width), out);
-  out.score = static_cast<double>(path.columns.size()) / path.length_px();
+  resample_rims(samples, std::max(8.0 * working.reduction, config.max_gap_diameters * width), out);
+  out.score = static_cast<double>(
+                  std::count_if(path.columns.begin(), path.columns.end(), [](const auto& c) { return c.pair.both; })) /
+              path.length_px();
   return out;
 }
 
@@ -196,26 +188,18 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
     return job_failed("no forging: no edge along the axis direction stands out of the noise; is the exposure right?");
   }
   const auto pairs = pair_rims(working, rims, prior.diameter_min_px / r, prior.diameter_max_px / r);
-  if (!any(pairs))
+  if (!any(pairs.columns))
     return job_failed(
         "no forging: edges were found, but no two of them {:.0f} to {:.0f} px apart with a {} body between",
         prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
 
-  BodyPath best, longest;
-  double best_rating = 0.0;
   const double max_offset = config.max_axis_bow * prior.diameter_min_px / r + 3.0;
-  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, 0.3 * prior.diameter_min_px / r, config)) {
-    const BodyPath path = follow_body(pairs, working, line, max_offset, config.max_gap_diameters);
-    if (path.length_px() > longest.length_px()) longest = path;
-    const double rating = rate_body(path, working, prior, config);
-    if (rating > best_rating) best_rating = rating, best = path;
-  }
-  if (best.empty())
+  const BodyPath best = find_body(pairs, rims, working, prior, max_offset, config);
+  if (const double width = best.median_width_px(); best.length_px() < config.min_elongation * width || best.empty())
     return job_failed(
-        "no forging: the longest body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths "
-        "is needed",
-        longest.length_px() * r, longest.median_width_px() * r, config.min_elongation);
-  best = refine_body(best, pairs, working, max_offset, config);
+        "no forging: the best body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is "
+        "needed",
+        best.length_px() * r, width * r, config.min_elongation);
   Segmentation found = describe(best, working, config);
   if (found.score < config.min_score)
     return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",
