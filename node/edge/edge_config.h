@@ -20,7 +20,7 @@ struct EdgeConfig {
                                     // or beam behind the rim is weaker than that; ours
   int max_gap_stations = 300;       // longest stretch without edge that a rim is followed across; ours
   int blur_region_stations = 256;   // the blur is taken as constant over this length; ours
-  double end_half_band = 0.15;      // rows on either side of the axis for the ends, share of the diameter; ours
+  double end_half_band = 0.35;      // rows on either side of the axis for the ends, share of the diameter; ours
   double end_search_px = 24.0;      // about the coarse end; ours
 
   [[nodiscard]] Result<void> validate() const;

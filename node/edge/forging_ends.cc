@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 
 #include "node/edge/edge_path.h"
 #include "node/edge/scan_lines.h"
@@ -39,46 +40,80 @@ double band_level(const cv::Mat& image, const SilhouetteFrame& frame, double sta
 }
 
 struct ArcPoint {
-  double offset_px, station_px, sigma_px;
+  double across;  ///< offset from the axis in half diameters
+  double station_px;
 };
 
-// Robust parabola station(offset) about `at`: value and standard deviation there.
-bool fit_arc(const std::vector<ArcPoint>& points, double at, double half_band, LocatedEnd& end) {
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d normal;
-  double scale = 1e9, mean_square = 0, used = 0;
-  for (int pass = 0; pass < 6; ++pass) {
-    normal.setZero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const ArcPoint& point : points) {
-      const double x = (point.offset_px - at) / half_band;
-      const Eigen::Vector3d g(1.0, x, x * x);
-      const double r = point.station_px - g.dot(p);
-      const double w = pass == 0 ? 1.0 : std::pow(std::max(0.0, 1 - (r / scale) * (r / scale)), 2);
-      normal += w * g * g.transpose();
-      right += w * point.station_px * g;
-    }
-    const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
-    if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 1e-6)) return false;
-    p = solver.solve(right);
-    std::vector<double> residuals;
-    for (const ArcPoint& point : points) {
-      const double x = (point.offset_px - at) / half_band;
-      residuals.push_back(std::abs(point.station_px - p[0] - p[1] * x - p[2] * x * x));
-    }
-    const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-    std::nth_element(residuals.begin(), middle, residuals.end());
-    scale = std::max(0.05, 4.685 * 1.4826 * *middle);
-    mean_square = used = 0;
-    for (const double r : residuals)
-      if (r < scale) mean_square += r * r, used += 1;
+// The outline of an end face: half an ellipse about the axis, and a lean. Linear in its coefficients.
+Eigen::Vector3d arc_terms(double across) {
+  return {1.0, across, 1.0 - std::sqrt(std::max(0.0, 1.0 - across * across))};
+}
+
+struct ArcFit {
+  Eigen::Vector3d coefficients = Eigen::Vector3d::Zero();
+  double apex_variance = 0.0;  ///< for points with a variance of 1
+  double rms = 0.0;
+  int count = 0;
+};
+
+// Least squares through the points that lie within `reach` of the arc given.
+std::optional<ArcFit> refit_arc(const std::vector<ArcPoint>& points, const Eigen::Vector3d& from, double reach) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  ArcFit fit;
+  double least = 1, most = -1;
+  for (const ArcPoint& p : points) {
+    const Eigen::Vector3d g = arc_terms(p.across);
+    if (std::abs(p.station_px - g.dot(from)) > reach) continue;
+    normal += g * g.transpose(), right += p.station_px * g;
+    least = std::min(least, p.across), most = std::max(most, p.across);
+    ++fit.count;
   }
-  if (used < 5 || used < 0.5 * static_cast<double>(points.size())) return false;
-  end.station_px = p[0];
-  end.offset_px = at;
-  end.sigma_px = std::max(
-      0.01, std::sqrt(mean_square / std::max(1.0, used - 3) * normal.ldlt().solve(Eigen::Vector3d::UnitX())[0]));
-  return true;
+  const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
+  if (fit.count < 6 || solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 1e-7)) return std::nullopt;
+  fit.coefficients = solver.solve(right);
+  fit.apex_variance = solver.solve(Eigen::Vector3d::UnitX())[0];
+  double squares = 0;
+  for (const ArcPoint& p : points)
+    if (const double r = p.station_px - arc_terms(p.across).dot(fit.coefficients);
+        std::abs(p.station_px - arc_terms(p.across).dot(from)) <= reach)
+      squares += r * r;
+  fit.rms = std::sqrt(squares / std::max(1, fit.count - 3));
+  return fit;
+}
+
+// The arc that most points agree with (consensus of threes); of arcs with about as many, the outermost: scale on the
+// end moves its points inwards.
+std::optional<ArcFit> consensus_arc(const std::vector<ArcPoint>& points, double outward) {
+  constexpr double kAgreePx = 0.5;
+  const std::size_t n = points.size(), third = n / 3;
+  if (third < 2) return std::nullopt;
+  Eigen::Vector3d best = Eigen::Vector3d::Zero();
+  double best_score = 0;
+  const std::size_t every = std::max<std::size_t>(1, third / 8);
+  for (std::size_t i = 0; i < third; i += every) {
+    for (std::size_t k = third; k < 2 * third; k += every) {
+      for (std::size_t m = 2 * third; m < n; m += every) {
+        Eigen::Matrix3d a;
+        a << arc_terms(points[i].across).transpose(), arc_terms(points[k].across).transpose(),
+            arc_terms(points[m].across).transpose();
+        if (std::abs(a.determinant()) < 1e-6) continue;
+        const Eigen::Vector3d arc =
+            a.inverse() * Eigen::Vector3d(points[i].station_px, points[k].station_px, points[m].station_px);
+        if (outward * arc[2] > 3.0) continue;  // an end face bulges outwards or, square to the view, not at all
+        double score = 0;
+        for (const ArcPoint& p : points) {
+          const double out = outward * (p.station_px - arc_terms(p.across).dot(arc));
+          score += std::abs(out) < kAgreePx ? 1.0 - std::abs(out) / kAgreePx : out > kAgreePx ? -0.5 : 0.0;
+        }
+        if (score > best_score) best_score = score, best = arc;
+      }
+    }
+  }
+  if (!(best_score > 0)) return std::nullopt;
+  auto fit = refit_arc(points, best, 2 * kAgreePx);
+  if (fit) fit = refit_arc(points, fit->coefficients, 2 * kAgreePx);
+  return fit;
 }
 
 }  // namespace
@@ -97,22 +132,27 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
   if (body.size() < 8) return std::nullopt;
   const auto middle = body.begin() + static_cast<std::ptrdiff_t>(body.size() / 2);
   std::nth_element(body.begin(), middle, body.end());
-  double darkest = *middle;
-  for (int k = -inside_px; k <= outside_px; ++k) {
-    const double level = band_level(image, frame, search.station_px + outward * k, search, invert);
-    if (level >= 0) darkest = std::min(darkest, level);
+  // Where it falls off most: from the levels over a fifth of a diameter before to those behind.
+  const int half = std::max(6, static_cast<int>(0.2 * search.diameter_px));
+  std::vector<double> levels;
+  for (int k = -inside_px - half; k <= outside_px + half; ++k)
+    levels.push_back(band_level(image, frame, search.station_px + outward * k, search, invert));
+  const auto usable = static_cast<std::size_t>(
+      std::find_if(levels.begin() + inside_px + half, levels.end(), [](double v) { return v < 0; }) - levels.begin());
+  const auto mean = [&](std::size_t from, std::size_t to) {
+    double sum = 0;
+    for (std::size_t i = from; i < to; ++i) sum += levels[i];
+    return sum / static_cast<double>(to - from);
+  };
+  double deepest = 0;
+  std::size_t at = 0;
+  const auto width = static_cast<std::size_t>(half);
+  for (std::size_t i = width; i + 4 <= usable; ++i) {
+    const double fall = mean(i - width, i) - mean(i, std::min(usable, i + width));
+    if (fall > deepest) deepest = fall, at = i;
   }
-  // Scale on the surface is a dark stretch too, but the body comes back behind it.
-  const double threshold = 0.5 * (*middle + darkest);
-  const int longest_dark = std::max(8, static_cast<int>(0.4 * search.diameter_px));
-  int dark = 0;
-  for (int k = -inside_px; k <= outside_px; ++k) {
-    const double level = band_level(image, frame, search.station_px + outward * k, search, invert);
-    if (level < 0) return dark > 4 ? std::optional(search.station_px + outward * (k - dark)) : std::nullopt;
-    dark = level < threshold ? dark + 1 : 0;
-    if (dark >= longest_dark) return search.station_px + outward * (k - dark + 1);
-  }
-  return std::nullopt;
+  if (!(deepest > 0.2 * *middle)) return std::nullopt;
+  return search.station_px + outward * (static_cast<double>(at) - inside_px - half - 0.5);
 }
 
 LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search, Polarity polarity,
@@ -143,12 +183,18 @@ LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const 
   const ScanLines scan =
       read_scan_lines(image, requests, rows ? cv::Vec2d(sign, 0) : cv::Vec2d(0, sign), 1.0, polarity == Polarity::dark);
   std::vector<ArcPoint> points;
+  const double radius_px = 0.5 * search.diameter_px;
   for (const StepEdge& edge : fit_step_edges(scan, trace_rim(scan, true, config), config.blur_region_stations)) {
     const ObservedPoint p = scan.at(scan.lines[edge.line], edge.position_px);
-    points.push_back({frame.offset_px(p), frame.station_px(p), edge.sigma_px});
+    points.push_back({(frame.offset_px(p) - search.axis_offset_px) / radius_px, frame.station_px(p)});
   }
-  if (points.size() < 7 || points.size() < static_cast<std::size_t>(reach)) return end;
-  end.visible = fit_arc(points, search.axis_offset_px, half_band, end);
+  const auto arc = consensus_arc(points, search.at_start ? -1.0 : 1.0);
+  // Half of the rows must have seen it: less may be any straight border near the end.
+  if (!arc || arc->count < reach) return end;
+  end.visible = true;
+  end.station_px = arc->coefficients[0];
+  // Haze moves neighbouring rows together: one independent point in five.
+  end.sigma_px = std::max(0.01, std::sqrt(5 * arc->apex_variance) * arc->rms);
   return end;
 }
 

@@ -16,13 +16,13 @@ struct EndSearch {
   double diameter_px = 0.0;
 };
 
-/// The coarse station at which the body's brightness ends on the axis, walking outwards from inside; nothing when it
-/// goes on to the border of the image.
+/// The coarse station at which the body's brightness falls off most along the axis, near the end that the segmentation
+/// saw; nothing when it goes on to the border of the image.
 std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search,
                                   Polarity polarity);
 
-/// The end to subpixel: edges on scan lines along the axis (along pixel rows or columns) within a band about it, a
-/// parabola through them (the outline there is an arc of the end face), its value on the axis.
+/// The end to subpixel: edges on scan lines along the axis (along pixel rows or columns) within a band about it, half
+/// an ellipse through those that agree (the outline there is an arc of the end face), its apex on the axis.
 LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search, Polarity polarity,
                       const EdgeConfig& config);
 

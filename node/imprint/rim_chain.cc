@@ -86,7 +86,7 @@ void keep_likeliest_course(RimCurve& rim, const std::vector<double>& cuts, const
     const double excess = std::max(0.0, std::abs(off) - free_px - 0.01 * gap);
     const double turn = std::max(0.0, std::abs(b.head.c1 - a.tail.c1) - slope_tolerance(a) - slope_tolerance(b));
     double step = price * std::min(1.0, excess / 1.5 + turn / 0.3);
-    if (step > 0) {
+    if (step > 0 && std::abs(off) > config.min_shared_step_px) {
       // Shared with the other rim: it moves in or out by about as much over the same gap.
       const auto shared = step_between(other, a.to, b.from);
       if (shared && -*shared * off > 0.5 * off * off && -*shared * off < 2 * off * off) step *= 0.15;

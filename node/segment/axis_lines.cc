@@ -1,6 +1,7 @@
 #include "node/segment/axis_lines.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -24,6 +25,18 @@ class ColumnSums {
  private:
   std::vector<double> sum_;
 };
+
+float upper_quartile(const cv::Mat_<float>& image, int x, float upper_px, float lower_px) {
+  std::array<float, 64> values{};
+  const int from = std::clamp(static_cast<int>(upper_px) + 2, 0, image.rows - 1);
+  const int to = std::clamp(static_cast<int>(lower_px) - 2, from, image.rows - 1);
+  const int every = (to - from) / 64 + 1;
+  int count = 0;
+  for (int y = from; y <= to && count < 64; y += every) values[static_cast<std::size_t>(count++)] = image(y, x);
+  const auto quartile = values.begin() + 3 * count / 4;
+  std::nth_element(values.begin(), quartile, values.begin() + count);
+  return *quartile;
+}
 
 // How much of the inside is brighter than the level halfway between outside and rim, 0 to 1. Two bodies with
 // a gap between them, or the rim of one and the rim of another, fail here.
@@ -74,7 +87,9 @@ RimPairs pair_rims(const WorkingImage& working, const RimCandidates& rims, doubl
         if (width < min_width_px || width > max_width_px) continue;
         RimPair pair{upper.y_px, lower.y_px, std::sqrt(upper.strength * lower.strength)};
         pair.weight *= static_cast<float>(inside_weight(working.intensity, static_cast<int>(x), sums, pair));
-        if (pair.weight > 0.05F) pairs.columns[x].push_back(pair);
+        if (!(pair.weight > 0.05F)) continue;
+        pair.body = upper_quartile(working.intensity, static_cast<int>(x), pair.upper_px, pair.lower_px);
+        pairs.columns[x].push_back(pair);
       }
     }
   }
@@ -83,7 +98,7 @@ RimPairs pair_rims(const WorkingImage& working, const RimCandidates& rims, doubl
 }
 
 RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, const RimCandidates& rims,
-                          const AxisLine& line, double max_offset_px, int max_count) {
+                          const AxisLine& line, double max_offset_px, float least_body, int max_count) {
   constexpr float kLoneRim = 0.4F;  // one rim is less than half of a pair
   RimPairs near;
   near.columns.resize(pairs.columns.size());
@@ -92,7 +107,7 @@ RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, co
     auto& column = near.columns[x];
     const auto axis = static_cast<float>(line.y_px(static_cast<double>(x)));
     for (const RimPair& pair : pairs.columns[x])
-      if (std::abs(pair.middle_px() - axis) <= max_offset_px) column.push_back(pair);
+      if (pair.body >= least_body && std::abs(pair.middle_px() - axis) <= max_offset_px) column.push_back(pair);
     if (rims.upper[x].empty() && rims.lower[x].empty()) continue;
     const ColumnSums sums(working.intensity, static_cast<int>(x));
     for (const bool upper : {true, false}) {
@@ -107,7 +122,10 @@ RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, co
         if (step <= 0) continue;
         const float body = band(0.2F * half, half) - outside;  // goes on to the axis
         const float inside = std::clamp(body / step, 0.0F, 1.0F);
-        RimPair pair{upper ? rim.y_px : 2 * axis - rim.y_px, upper ? 2 * axis - rim.y_px : rim.y_px, 0, step, false};
+        const float y_upper = upper ? rim.y_px : 2 * axis - rim.y_px, y_lower = 2 * axis - y_upper;
+        RimPair pair{y_upper, y_lower, 0, upper_quartile(working.intensity, static_cast<int>(x), y_upper, y_lower),
+                     step,    false};
+        if (pair.body < least_body) continue;
         pair.weight = kLoneRim * rim.strength * inside * step / (step + pairs.half_step);
         if (pair.weight > 0.03F) column.push_back(pair);
       }

@@ -21,6 +21,7 @@ struct RimPair {
   float upper_px = 0;
   float lower_px = 0;
   float weight = 0;  ///< 0 to 1: strength of both rims, how well the inside is brighter than the outside, and contrast
+  float body = 0;    ///< upper quartile of the grey levels inside: scale may darken most of a section
   float step = 0;    ///< the lower of the grey level steps at both rims, share of full scale
 
   bool both = true;  ///< false: one rim was seen, the other is its mirror image about the axis
@@ -42,9 +43,9 @@ struct RimPairs {
 RimPairs pair_rims(const WorkingImage& working, const RimCandidates& rims, double min_width_px, double max_width_px);
 
 /// The pairs near a known axis and, where scale or clutter hides one rim, lighter ones of the other rim and its mirror
-/// image. At most `max_count` a column.
+/// image. Pairs whose inside is not at least `least_body` bright are left out. At most `max_count` a column.
 RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, const RimCandidates& rims,
-                          const AxisLine& line, double max_offset_px, int max_count);
+                          const AxisLine& line, double max_offset_px, float least_body, int max_count);
 
 /// The lines with the most votes, by descending votes, apart by at least `separation_px` (Hough, [C] 2.3.2).
 /// A column gives one vote to a line however many pairs it has there.

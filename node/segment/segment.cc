@@ -56,6 +56,24 @@ double rate_body(const BodyPath& path, const WorkingImage& working, const Segmen
   return path.mean_weight() * by_length * by_width / (1 + z * z);
 }
 
+// The level that a section must have to belong to the body: a beam that happens to go on where the forging ends is
+// darker. The bright end of what was followed speaks for the body, since the beam may be longer.
+float least_body_level(const BodyPath& path, const WorkingImage& working, const SegmentConfig& config) {
+  std::vector<float> levels, background;
+  for (const auto& c : path.columns) levels.push_back(c.pair.body);
+  for (int y = 0; y < working.intensity.rows; y += 7)
+    for (int x = 0; x < working.intensity.cols; x += 7)
+      if (working.valid(y, x)) background.push_back(working.intensity(y, x));
+  const auto quantile = [](std::vector<float>& v, double share) {
+    const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+    std::nth_element(v.begin(), at, v.end());
+    return *at;
+  };
+  if (levels.empty() || background.empty()) return 0.0F;
+  const float dark = quantile(background, 0.5), usual = quantile(levels, 0.8);
+  return dark + static_cast<float>(config.min_body_level) * (usual - dark);
+}
+
 // The body that fits best: the lines with the most votes are followed on their full pairs; the best of these again
 // about their own axis, where one rim alone will do.
 BodyPath find_body(const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
@@ -77,7 +95,8 @@ BodyPath find_body(const RimPairs& pairs, const RimCandidates& rims, const Worki
   bodies.resize(std::min(bodies.size(), kFollowedTwice));
   for (Rated& body : bodies) {
     const AxisLine axis = fit_axis(body.path);
-    const RimPairs near = pairs_about_axis(pairs, working, rims, axis, max_offset_px, config.max_rims_per_column);
+    const RimPairs near = pairs_about_axis(pairs, working, rims, axis, max_offset_px,
+                                           least_body_level(body.path, working, config), config.max_rims_per_column);
     body.path = follow_body(near, working, axis, max_offset_px, config.max_gap_diameters);
     body.rating = rate_body(body.path, working, prior, config);
   }
