@@ -90,8 +90,7 @@ std::vector<EdgeCandidate> find_peaks(const ScanLines& scan, const ScanLine& lin
     if ((b - a + 1) * scan.spacing_px < config.min_peak_width_px) continue;
     const float bend = slope[i - 1] - 2 * slope[i] + slope[i + 1];
     const double shift = bend < 0 ? std::clamp(0.5 * (slope[i - 1] - slope[i + 1]) / bend, -0.5, 0.5) : 0.0;
-    peaks.push_back(
-        {line.first_px + (i + shift) * scan.spacing_px, slope[i], slope[i] / (slope[i] + threshold), 0.0F, i, i});
+    peaks.push_back({line.first_px + (i + shift) * scan.spacing_px, slope[i], slope[i] / (slope[i] + threshold), i, i});
   }
   if (peaks.size() > static_cast<std::size_t>(config.max_candidates)) {
     std::nth_element(peaks.begin(), peaks.begin() + config.max_candidates, peaks.end(),
@@ -112,64 +111,25 @@ std::vector<EdgeCandidate> find_peaks(const ScanLines& scan, const ScanLine& lin
   return peaks;
 }
 
-// Grey level of the body inside the rim, line by line: most of what lies well inside, over the neighbours too, so that
-// neither scale nor sparks decide.
-std::vector<float> body_levels(const ScanLines& scan, const SmoothLines& smooth) {
-  constexpr int kNeighbours = 12, kStride = 3;
-  constexpr double kInnerShare = 0.45, kQuantile = 0.7;
-  std::vector<float> levels(scan.lines.size(), 0.0F), values;
-  for (std::size_t n = 0; n < scan.lines.size(); ++n) {
-    values.clear();
-    const std::size_t first = n >= kNeighbours ? n - kNeighbours : 0;
-    for (std::size_t m = first; m <= std::min(n + kNeighbours, scan.lines.size() - 1); m += kStride) {
-      const ScanLine& line = scan.lines[m];
-      const auto from = static_cast<int>((1.0 - kInnerShare) * line.count);
-      for (int i = from; i < line.count; i += 2)
-        values.push_back(smooth.level[line.begin + static_cast<std::size_t>(i)]);
-    }
-    if (values.empty()) continue;
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    levels[n] = *at;
-  }
-  return levels;
-}
-
-// Edges whose inner side is not as bright as the body count little: a beam that passes behind the forging has edges
-// as long and straight as its rim.
-void reward_body_inside(const ScanLine& line, const SmoothLines& smooth, double spacing_px, float body,
-                        std::vector<EdgeCandidate>& peaks) {
-  const float* level = smooth.level.data() + line.begin;
-  const auto sample = [&](double position_px) {
-    return std::clamp(static_cast<int>(std::lround((position_px - line.first_px) / spacing_px)), 0, line.count - 1);
-  };
-  const float ground = *std::min_element(level, level + line.count);
-  for (EdgeCandidate& peak : peaks) {
-    const float inner = level[sample(peak.position_px + 4.0)];
-    const float belongs = (inner - ground) / std::max(body - ground, 1e-4F);
-    peak.inside = std::clamp((belongs - 0.45F) / 0.3F, 0.0F, 1.0F);
-    peak.reward *= 0.1 + 0.9 * peak.inside;
-  }
-}
-
-// The outermost edge of some strength from which the body goes on without a fall back to the background gets the bonus.
+// The outermost edge from which the body goes on without a fall back to the background is worth nearly as much as the
+// strongest: where scale shows the rim weakly, the chain then stays on it, since leaving it costs two jumps. A beam or
+// a plate behind the rim looks the same, but the rim beside it is worth more in the long run.
 void reward_outermost(const ScanLine& line, const SmoothLines& smooth, double spacing_px, const EdgeConfig& config,
                       std::vector<EdgeCandidate>& peaks) {
-  double strongest = 0;
-  for (const EdgeCandidate& peak : peaks) strongest = std::max(strongest, peak.slope);
+  double highest = 0;
+  for (const EdgeCandidate& peak : peaks) highest = std::max(highest, peak.reward);
   const float* level = smooth.level.data() + line.begin;
   const auto sample = [&](double position_px) {
     return std::clamp(static_cast<int>(std::lround((position_px - line.first_px) / spacing_px)), 0, line.count - 1);
   };
-  for (std::size_t k = 0; k < peaks.size(); ++k) {
-    if (peaks[k].slope < config.outermost_share * strongest || peaks[k].inside < 0.5F) continue;
-    const int before = sample(peaks[k].position_px - 3), after = sample(peaks[k].position_px + 3);
+  for (EdgeCandidate& peak : peaks) {
+    const int before = sample(peak.position_px - 3), after = sample(peak.position_px + 3);
     const float background = level[before], body = level[after];
     const float fallen = background + 0.35F * (body - background);
     bool goes_on = true;
     for (int i = after; i < line.count && goes_on; ++i) goes_on = level[i] > fallen;
     if (!goes_on) continue;
-    peaks[k].reward += config.outermost_bonus;
+    peak.reward = std::max(peak.reward, config.outermost_share * highest);
     break;
   }
 }
@@ -207,16 +167,12 @@ std::vector<TracedEdge> trace_rim(const ScanLines& scan, bool prefer_outermost, 
   std::vector<std::vector<EdgeCandidate>> peaks(scan.lines.size());
   for (std::size_t n = 0; n < scan.lines.size(); ++n) peaks[n] = find_peaks(scan, scan.lines[n], smooth, config);
   reward_usual_strength(peaks);
-  const std::vector<float> body = prefer_outermost ? body_levels(scan, smooth) : std::vector<float>{};
   std::vector<std::vector<Node>> nodes(scan.lines.size());
   int best_line = -1, best_index = -1;
   double best_gain = 0.0;
   for (std::size_t n = 0; n < scan.lines.size(); ++n) {
     const ScanLine& line = scan.lines[n];
-    if (prefer_outermost) {
-      reward_body_inside(line, smooth, scan.spacing_px, body[n], peaks[n]);
-      reward_outermost(line, smooth, scan.spacing_px, config, peaks[n]);
-    }
+    if (prefer_outermost) reward_outermost(line, smooth, scan.spacing_px, config, peaks[n]);
     for (const EdgeCandidate& peak : peaks[n]) {
       Node node{peak};
       double inherited = 0.0;

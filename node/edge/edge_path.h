@@ -11,8 +11,7 @@ namespace imprint {
 struct EdgeCandidate {
   double position_px = 0.0;  ///< along the scan line, to about a quarter px
   double slope = 0.0;        ///< first derivative, share of full scale per px
-  double reward = 0.0;       ///< 0 to 1: how far it stands above the noise; plus the outermost bonus
-  float inside = 0.0F;       ///< 0 to 1: how much its inner side belongs to the body
+  double reward = 0.0;       ///< 0 to 1: how far it stands above the noise and how near it comes to the usual strength
   int from_sample = 0;       ///< samples that belong to this edge alone: half way to its neighbours
   int to_sample = 0;
 };
@@ -26,8 +25,8 @@ struct TracedEdge {
 /// The chain of candidates that follows one rim, by ascending line: Viterbi over all candidates of all lines, with a
 /// fixed price for jumps, so that steps stay steps while sparks and marks of a few px do not pull the rim away.
 /// `prefer_outermost`: where a weaker edge lies outside a stronger one and the grey level does not fall back to the
-/// background between them, the outer one is the rim and the inner one the border of scale;
-/// and an edge whose inner side is darker than the body is something behind it.
+/// background between them, the outer one may be the rim and the inner one the border of scale: it counts nearly as
+/// much.
 std::vector<TracedEdge> trace_rim(const ScanLines& scan, bool prefer_outermost, const EdgeConfig& config);
 
 }  // namespace imprint

@@ -20,7 +20,7 @@ double jump_cost(const RimPair& a, const RimPair& b, int columns_apart, double s
   const double shift = std::abs(b.middle_px() - a.middle_px() - slope * apart);
   const double widening = 0.5 * std::abs((b.lower_px - b.upper_px) - (a.lower_px - a.upper_px));
   const double free = 0.15 * apart;  // taper and rounding
-  return std::min(8.0, 0.8 * std::max(0.0, shift - free)) + std::min(4.0, 0.5 * std::max(0.0, widening - free));
+  return std::min(4.0, 0.5 * std::max(0.0, shift - free)) + std::min(1.5, 0.2 * std::max(0.0, widening - free));
 }
 
 // Is the body still there between two columns, about as bright as at both ends?
@@ -93,7 +93,7 @@ BodyPath follow_body(const RimPairs& rim_pairs, const WorkingImage& working, con
         if (r > x || (r > 8 && r > max_gap_widths * node.pair.width_px())) break;
         const auto& before = nodes[static_cast<std::size_t>(x - r)];
         for (std::size_t m = 0; m < before.size(); ++m) {
-          const double gain = before[m].gain - 0.15 * (r - 1) - jump_cost(before[m].pair, node.pair, r, line.slope);
+          const double gain = before[m].gain - 0.05 * (r - 1) - jump_cost(before[m].pair, node.pair, r, line.slope);
           if (gain <= inherited) continue;
           if (r > 8 && !inside_goes_on(working.intensity, before[m].pair, x - r, node.pair, x)) continue;
           inherited = gain, node.from_x = x - r, node.from_index = static_cast<int>(m);
