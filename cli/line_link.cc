@@ -22,7 +22,8 @@ Result<LineLink> LineLink::open(const LineOptions& options) {
   return LineLink(options, std::move(*keys), std::move(*transport));
 }
 
-Result<nlohmann::json> LineLink::ask(const std::string& name, const std::string& parameters, milliseconds timeout) const {
+Result<nlohmann::json> LineLink::ask(const std::string& name, const std::string& parameters,
+                                     milliseconds timeout) const {
   const auto until = steady_clock::now() + timeout;
   const std::string selector = keys_.fusion_service(name) + (parameters.empty() ? "" : "?" + parameters);
   while (true) {
@@ -37,8 +38,8 @@ Result<nlohmann::json> LineLink::ask(const std::string& name, const std::string&
     }
     std::this_thread::sleep_for(std::min(left, kBetweenTries));
   }
-  return job_failed("no fusion of site {}, line {} answered at {} within {:.1f} s; is imprint-fusion running?", options_.site,
-                    options_.line, options_.connect, static_cast<double>(timeout.count()) / 1000.0);
+  return job_failed("no fusion of site {}, line {} answered at {} within {:.1f} s; is imprint-fusion running?",
+                    options_.site, options_.line, options_.connect, static_cast<double>(timeout.count()) / 1000.0);
 }
 
 }  // namespace imprint

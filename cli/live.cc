@@ -49,7 +49,8 @@ void print_camera(const json& camera) {
                              health["targets_seen"].get<int>(), health["reprojection_rms_px"].get<double>(),
                              health["frames"].get<std::uint64_t>(), health["failed_frames"].get<std::uint64_t>(),
                              health["age_s"].get<double>());
-    if (const auto error = health["last_error"].get<std::string>(); !error.empty()) std::cout << "; last error: " << error;
+    if (const auto error = health["last_error"].get<std::string>(); !error.empty())
+      std::cout << "; last error: " << error;
   }
   std::cout << '\n';
 }
@@ -60,17 +61,20 @@ void print_status(const json& status) {
                            status["uptime_s"].get<double>());
   for (const json& camera : status["cameras"]) print_camera(camera);
   if (const json& session = status["session"]; session.is_object()) {
-    const auto settled = std::ranges::count_if(session["observations"], [](const json& o) { return o["settled"].get<bool>(); });
-    std::cout << fmt::format("session {}: {} of {} observations in, {}\n", session["session"].get<std::string>(), settled,
-                             session["observations_expected"].get<int>(),
+    const auto settled =
+        std::ranges::count_if(session["observations"], [](const json& o) { return o["settled"].get<bool>(); });
+    std::cout << fmt::format("session {}: {} of {} observations in, {}\n", session["session"].get<std::string>(),
+                             settled, session["observations_expected"].get<int>(),
                              session["complete"].get<bool>() ? "complete" : "not complete");
   }
   if (const json& last = status["last_result"]; last.is_object()) {
     const auto error = last["error"].get<std::string>();
-    std::cout << fmt::format("last result: {} at {}: ", last["session"].get<std::string>(), last["made_at"].get<std::string>())
-              << (error.empty() ? fmt::format("length {:.1f} mm, deflection {:.2f} mm", last["result"]["length_mm"].get<double>(),
-                                              last["result"]["max_deflection_mm"].get<double>())
-                                : "no measurement: " + error)
+    std::cout << fmt::format("last result: {} at {}: ", last["session"].get<std::string>(),
+                             last["made_at"].get<std::string>())
+              << (error.empty()
+                      ? fmt::format("length {:.1f} mm, deflection {:.2f} mm", last["result"]["length_mm"].get<double>(),
+                                    last["result"]["max_deflection_mm"].get<double>())
+                      : "no measurement: " + error)
               << '\n';
   }
   for (const json& alarm : status["alarms"]) std::cout << "ALARM " << alarm["text"].get<std::string>() << '\n';
@@ -90,7 +94,7 @@ int run_status(const LineOptions& options, double timeout_s, bool as_json) {
 
 struct WatchOptions {
   LineOptions line;
-  std::size_t count = 0;  // 0: without end
+  std::size_t count = 0;   // 0: without end
   double timeout_s = 0.0;  // 0: without end
   bool results_only = false;
 };
@@ -111,31 +115,37 @@ Event trigger_event(const Trigger& trigger) {
 }
 
 Event imprint_event(const Imprint& imprint) {
-  return {{{"event", "imprint"},
-           {"camera", imprint.camera_id},
-           {"session", imprint.session},
-           {"observation", imprint.observation},
-           {"targets_used", imprint.quality.targets_used},
-           {"reprojection_rms_px", imprint.quality.reprojection_rms_px},
-           {"edge_coverage", imprint.quality.edge_coverage},
-           {"failure", imprint.failure}},
-          fmt::format("imprint  session {} observation {} {}: ", imprint.session, imprint.observation, imprint.camera_id) +
-              (imprint.failure.empty()
-                   ? fmt::format("{} targets, reprojection rms {:.3f} px, coverage {:.0f} %", imprint.quality.targets_used,
-                                 imprint.quality.reprojection_rms_px, 100.0 * imprint.quality.edge_coverage)
-                   : "failed: " + imprint.failure)};
+  return {
+      {{"event", "imprint"},
+       {"camera", imprint.camera_id},
+       {"session", imprint.session},
+       {"observation", imprint.observation},
+       {"targets_used", imprint.quality.targets_used},
+       {"reprojection_rms_px", imprint.quality.reprojection_rms_px},
+       {"edge_coverage", imprint.quality.edge_coverage},
+       {"failure", imprint.failure}},
+      fmt::format("imprint  session {} observation {} {}: ", imprint.session, imprint.observation, imprint.camera_id) +
+          (imprint.failure.empty()
+               ? fmt::format("{} targets, reprojection rms {:.3f} px, coverage {:.0f} %", imprint.quality.targets_used,
+                             imprint.quality.reprojection_rms_px, 100.0 * imprint.quality.edge_coverage)
+               : "failed: " + imprint.failure)};
 }
 
 Event result_event(const ResultMessage& message) {
   json result = message.json.empty() ? json() : json::parse(message.json, nullptr, false);
   if (result.is_discarded()) result = nullptr;
   std::string text = fmt::format("result   session {}{}: ", message.session, message.complete ? "" : " (not complete)");
-  const auto measurement = result.is_object() ? measurement_from_json(result) : Result<Measurement>(job_failed("{}", message.error));
-  text += measurement ? fmt::format("length {:.1f} mm, deflection {:.2f} mm at {:.0f} mm, {} observation(s), {} warning(s)",
-                                    measurement->length_mm, measurement->max_deflection_mm, measurement->max_deflection_at_mm,
-                                    measurement->observations.size(), measurement->warnings.size())
-                      : "no measurement: " + measurement.error().message;
-  return {{{"event", "result"}, {"session", message.session}, {"complete", message.complete}, {"error", message.error},
+  const auto measurement =
+      result.is_object() ? measurement_from_json(result) : Result<Measurement>(job_failed("{}", message.error));
+  text += measurement
+              ? fmt::format("length {:.1f} mm, deflection {:.2f} mm at {:.0f} mm, {} observation(s), {} warning(s)",
+                            measurement->length_mm, measurement->max_deflection_mm, measurement->max_deflection_at_mm,
+                            measurement->observations.size(), measurement->warnings.size())
+              : "no measurement: " + measurement.error().message;
+  return {{{"event", "result"},
+           {"session", message.session},
+           {"complete", message.complete},
+           {"error", message.error},
            {"result", std::move(result)}},
           std::move(text)};
 }
@@ -196,7 +206,8 @@ int run_watch(const WatchOptions& options, bool as_json) {
     if (!declaration) return fail(declaration.error());
   }
   EventPrinter printer(as_json);
-  const auto until = options.timeout_s > 0.0 ? std::optional(steady_clock::now() + to_milliseconds(options.timeout_s)) : std::nullopt;
+  const auto until =
+      options.timeout_s > 0.0 ? std::optional(steady_clock::now() + to_milliseconds(options.timeout_s)) : std::nullopt;
   while (!stop.wait_for(milliseconds(0))) {
     if (options.count > 0 && printer.count() >= options.count) return 0;
     if (until && steady_clock::now() >= *until) return options.count > 0 ? 1 : 0;
@@ -268,8 +279,9 @@ Result<json> await_result(const LineLink& link, const Trigger& trigger, steady_c
 
 int print_result(const json& session_result, bool as_json) {
   if (!session_result["result"].is_object()) {
-    return fail(Error{ErrorKind::job_failed, fmt::format("session {}: no measurement: {}", session_result["session"].get<std::string>(),
-                                                         session_result["error"].get<std::string>())});
+    return fail(Error{ErrorKind::job_failed,
+                      fmt::format("session {}: no measurement: {}", session_result["session"].get<std::string>(),
+                                  session_result["error"].get<std::string>())});
   }
   if (as_json) return print_json(session_result["result"]);
   const auto measurement = measurement_from_json(session_result["result"]);
@@ -301,7 +313,9 @@ int run_trigger(const TriggerOptions& options, bool as_json) {
   if (const auto sent = send(*link, **publisher, trigger); !sent) return fail(sent.error());
   if (!options.wait_s) {
     if (as_json) {
-      return print_json({{"session", trigger.session}, {"observation", trigger.observation}, {"rotation_deg", trigger.rotation_deg},
+      return print_json({{"session", trigger.session},
+                         {"observation", trigger.observation},
+                         {"rotation_deg", trigger.rotation_deg},
                          {"observations_expected", trigger.observations_expected}});
     }
     std::cout << fmt::format("session {} observation {}: triggered\n", trigger.session, trigger.observation);
@@ -325,17 +339,22 @@ void add_live_commands(Cli& cli) {
     double timeout_s = 3.0;
   };
   auto status_options = std::make_shared<StatusOptions>();
-  CLI::App* status = cli.command(cli.app, "status", "the running line: cameras, health, fusion, last session",
-                                 [&cli, status_options] { return run_status(status_options->line, status_options->timeout_s, cli.json); });
+  CLI::App* status = cli.command(
+      cli.app, "status", "the running line: cameras, health, fusion, last session",
+      [&cli, status_options] { return run_status(status_options->line, status_options->timeout_s, cli.json); });
   add_line_options(*status, status_options->line);
-  status->add_option("--timeout", status_options->timeout_s, "s to wait for fusion")->check(CLI::Range(0.1, 3600.0))->capture_default_str();
+  status->add_option("--timeout", status_options->timeout_s, "s to wait for fusion")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
 
   auto watch_options = std::make_shared<WatchOptions>();
   CLI::App* watch = cli.command(cli.app, "watch", "prints triggers, imprints and results as they come, until Ctrl-C",
                                 [&cli, watch_options] { return run_watch(*watch_options, cli.json); });
   add_line_options(*watch, watch_options->line);
   watch->add_option("--count", watch_options->count, "end after this many events")->check(CLI::Range(1, 1'000'000'000));
-  watch->add_option("--timeout", watch_options->timeout_s, "end after this many s; exit status 1 when --count was not reached")
+  watch
+      ->add_option("--timeout", watch_options->timeout_s,
+                   "end after this many s; exit status 1 when --count was not reached")
       ->check(CLI::Range(0.1, 1e9));
   watch->add_flag("--results", watch_options->results_only, "only results");
 
@@ -344,12 +363,14 @@ void add_live_commands(Cli& cli) {
                                   [&cli, trigger_options] { return run_trigger(*trigger_options, cli.json); });
   add_line_options(*trigger, trigger_options->line);
   trigger->add_option("--session", trigger_options->trigger.session, "name of this forging's measurement")->required();
-  trigger->add_option("--observation", trigger_options->trigger.observation, "index, from 0")->check(CLI::Range(0, 1'000'000));
+  trigger->add_option("--observation", trigger_options->trigger.observation, "index, from 0")
+      ->check(CLI::Range(0, 1'000'000));
   trigger->add_option("--rotation-deg", trigger_options->trigger.rotation_deg, "of the forging about its axis")
       ->check(CLI::Range(-3600.0, 3600.0));
   trigger->add_option("--expect", trigger_options->trigger.observations_expected, "observations this session will have")
       ->check(CLI::Range(1, 1'000'000));
-  trigger->add_option("--wait", trigger_options->wait_s, "s to wait for the result; exit status 1 when it does not come")
+  trigger
+      ->add_option("--wait", trigger_options->wait_s, "s to wait for the result; exit status 1 when it does not come")
       ->check(CLI::Range(0.1, 86'400.0));
 }
 

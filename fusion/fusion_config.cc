@@ -35,10 +35,12 @@ std::string to_toml(const FusionConfig& config) {
   return fmt::format(
       "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmethod = {}\nlog_level = {}\n\n"
       "[zenoh]\nlisten = {}\nconnect = {}\n\n[page]\naddress = {}\nport = {}\n",
-      toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()), toml_text(config.database.string()),
+      toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
+      toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
       toml_number(config.assembler.deadline_s), toml_text(config.method), toml_text(config.log_level),
-      toml_list(config.zenoh.listen), toml_list(config.zenoh.connect), toml_text(config.page.address), config.page.port);
+      toml_list(config.zenoh.listen), toml_list(config.zenoh.connect), toml_text(config.page.address),
+      config.page.port);
 }
 
 }  // namespace imprint

@@ -14,12 +14,13 @@ constexpr std::size_t kMaxMessageBytes = 64 * 1024;  // sixteen times the larges
 constexpr std::size_t kMaxInOneGo = 256;             // messages before deadlines are looked at again
 constexpr std::size_t kImprintHistory = 256;         // asked of each node on start
 constexpr std::size_t kTriggerHistory = 16;
-constexpr std::size_t kPublishedSessions = 16;       // whose last result a late watcher still gets
+constexpr std::size_t kPublishedSessions = 16;  // whose last result a late watcher still gets
 constexpr auto kIdleWait = std::chrono::seconds(1);
 constexpr auto kRetryWait = std::chrono::milliseconds(500);
 
 std::int64_t wall_clock_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 std::string parameter(std::string_view parameters, std::string_view name) {
@@ -145,9 +146,12 @@ void FusionService::work() {
 
 void FusionService::handle(const Message& message) {
   switch (message.kind) {
-    case Kind::trigger: return receive_trigger(message);
-    case Kind::imprint: return receive_imprint(message);
-    case Kind::health: return receive_health(message);
+    case Kind::trigger:
+      return receive_trigger(message);
+    case Kind::imprint:
+      return receive_imprint(message);
+    case Kind::health:
+      return receive_health(message);
     case Kind::alive:
     case Kind::gone:
       if (const auto camera = keys_->camera_of(message.key)) receive_liveness(*camera, message.kind == Kind::alive);
@@ -157,7 +161,8 @@ void FusionService::handle(const Message& message) {
 void FusionService::receive_trigger(const Message& message) {
   const auto trigger = decode_trigger(message.bytes);
   if (!trigger) return malformed(message, trigger.error().message);
-  if (const auto valid = check_id("session", trigger->session); !valid) return malformed(message, valid.error().message);
+  if (const auto valid = check_id("session", trigger->session); !valid)
+    return malformed(message, valid.error().message);
   if (const auto bounds = assembler_.check(*trigger); !bounds) return malformed(message, bounds.error().message);
   bool is_new = false;
   if (!surely<bool>([&] { return store_.add_trigger(*trigger, message.bytes, wall_clock_ns()); }, is_new)) return;
@@ -177,12 +182,14 @@ void FusionService::receive_imprint(const Message& message) {
   if (keys_->camera_of(message.key) != imprint->camera_id) {
     return malformed(message, fmt::format("carries an imprint of camera {}", imprint->camera_id));
   }
-  if (const auto valid = check_id("session", imprint->session); !valid) return malformed(message, valid.error().message);
+  if (const auto valid = check_id("session", imprint->session); !valid)
+    return malformed(message, valid.error().message);
   if (rig_.find_camera(imprint->camera_id) == nullptr || imprint->observation >= config_.assembler.max_observations) {
     board_.count("refused");
-    spdlog::warn("imprint of camera {} for session {} observation {} refused: {}", imprint->camera_id, imprint->session,
-                 imprint->observation,
-                 rig_.find_camera(imprint->camera_id) == nullptr ? "the rig has no such camera" : "no such observation");
+    spdlog::warn(
+        "imprint of camera {} for session {} observation {} refused: {}", imprint->camera_id, imprint->session,
+        imprint->observation,
+        rig_.find_camera(imprint->camera_id) == nullptr ? "the rig has no such camera" : "no such observation");
     return;
   }
   bool is_new = false;
@@ -194,10 +201,12 @@ void FusionService::receive_imprint(const Message& message) {
   if (assembler_.knows(imprint->session)) {
     const Arrival arrival = assembler_.add(*imprint, now);
     if (arrival == Arrival::surplus) board_.count("surplus");
-    spdlog::info("session {} observation {}: imprint of {} {}{}", imprint->session, imprint->observation, imprint->camera_id,
-                 arrival_name(arrival), imprint->failure.empty() ? "" : "; it failed: " + imprint->failure);
+    spdlog::info("session {} observation {}: imprint of {} {}{}", imprint->session, imprint->observation,
+                 imprint->camera_id, arrival_name(arrival),
+                 imprint->failure.empty() ? "" : "; it failed: " + imprint->failure);
   } else {
-    spdlog::info("session {} observation {}: imprint of {}", imprint->session, imprint->observation, imprint->camera_id);
+    spdlog::info("session {} observation {}: imprint of {}", imprint->session, imprint->observation,
+                 imprint->camera_id);
     recall(imprint->session);
   }
   show_session(imprint->session);
@@ -223,7 +232,8 @@ void FusionService::receive_liveness(const std::string& camera_id, bool alive) {
   if (!alive) return;
   for (Trigger trigger : assembler_.open_triggers(camera_id)) {
     trigger.fire_at_ns = 0;  // that moment has passed
-    spdlog::info("session {} observation {}: trigger sent again for {}", trigger.session, trigger.observation, camera_id);
+    spdlog::info("session {} observation {}: trigger sent again for {}", trigger.session, trigger.observation,
+                 camera_id);
     if (auto sent = trigger_publisher_->put(encode_trigger(trigger)); !sent) spdlog::warn("{}", sent.error().message);
   }
 }
@@ -272,7 +282,8 @@ void FusionService::make_result(const std::string& session) {
   }
   if (!surely<std::int64_t>([&] { return store_.put_result(result); }, result.revision)) return;
   if (result.error.empty()) {
-    spdlog::info("session {}: result {} stored, {}", session, result.revision, result.complete ? "complete" : "not complete yet");
+    spdlog::info("session {}: result {} stored, {}", session, result.revision,
+                 result.complete ? "complete" : "not complete yet");
   } else {
     spdlog::warn("session {}: no measurement: {}", session, result.error);
   }

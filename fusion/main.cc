@@ -52,7 +52,8 @@ Result<void> run(const ProgramOptions& options) {
 
   std::vector<std::string> camera_ids;
   for (const CameraModel& camera : rig->cameras) camera_ids.push_back(camera.id);
-  LineBoard board({config->site, config->line, config->method, IMPRINT_VERSION}, camera_ids, std::chrono::steady_clock::now());
+  LineBoard board({config->site, config->line, config->method, IMPRINT_VERSION}, camera_ids,
+                  std::chrono::steady_clock::now());
   const auto page = PageServer::start(config->page, board, **store);
   if (!page) return pass_on(page.error());
   auto transport = open_zenoh(config->zenoh);
@@ -75,7 +76,8 @@ Result<void> run(const ProgramOptions& options) {
 int main(int argc, char** argv) {
   imprint::ProgramOptions options;
   if (const auto status = imprint::parse_program_options(
-          argc, argv, "imprint-fusion", "Fuses the imprints of a line's cameras into the geometry of the forging", options)) {
+          argc, argv, "imprint-fusion", "Fuses the imprints of a line's cameras into the geometry of the forging",
+          options)) {
     return *status;
   }
   return imprint::exit_status_of("imprint-fusion", [&] { return imprint::run(options); });

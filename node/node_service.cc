@@ -157,8 +157,8 @@ void NodeService::note(const Imprint& imprint) {
   }
   if (imprint.failure.empty()) {
     spdlog::info("session {} observation {}: imprint sent, {} targets, reprojection rms {:.3f} px, coverage {:.0f} %",
-                 imprint.session, imprint.observation, imprint.quality.targets_used, imprint.quality.reprojection_rms_px,
-                 100.0 * imprint.quality.edge_coverage);
+                 imprint.session, imprint.observation, imprint.quality.targets_used,
+                 imprint.quality.reprojection_rms_px, 100.0 * imprint.quality.edge_coverage);
   } else {
     spdlog::warn("session {} observation {}: no imprint: {}", imprint.session, imprint.observation, imprint.failure);
   }

@@ -32,12 +32,18 @@ Result<void> AssemblerConfig::validate() const {
 
 std::string_view arrival_name(Arrival arrival) {
   switch (arrival) {
-    case Arrival::taken: return "taken";
-    case Arrival::replaced: return "replaced";
-    case Arrival::repeated: return "repeated";
-    case Arrival::surplus: return "surplus";
-    case Arrival::unknown_camera: return "unknown camera";
-    case Arrival::refused: return "refused";
+    case Arrival::taken:
+      return "taken";
+    case Arrival::replaced:
+      return "replaced";
+    case Arrival::repeated:
+      return "repeated";
+    case Arrival::surplus:
+      return "surplus";
+    case Arrival::unknown_camera:
+      return "unknown camera";
+    case Arrival::refused:
+      return "refused";
   }
   return "refused";
 }
@@ -60,19 +66,22 @@ Result<void> ObservationAssembler::add(const Trigger& trigger, Time now) {
   if (trigger.observations_expected > session.expected) {
     session.expected = trigger.observations_expected;
     // Whether the session is complete may have changed, and with it what was announced.
-    session.due = session.due || std::ranges::any_of(session.observations, [](const auto& o) { return o.second.settled; });
+    session.due =
+        session.due || std::ranges::any_of(session.observations, [](const auto& o) { return o.second.settled; });
   }
   if (observation.trigger) {
     if (std::abs(observation.trigger->rotation_deg - trigger.rotation_deg) > kSameRotationDeg) {
-      session.warnings.insert(fmt::format("observation {}: triggered again with rotation {} deg; {} deg of the first trigger stays",
-                                          trigger.observation, trigger.rotation_deg, observation.trigger->rotation_deg));
+      session.warnings.insert(
+          fmt::format("observation {}: triggered again with rotation {} deg; {} deg of the first trigger stays",
+                      trigger.observation, trigger.rotation_deg, observation.trigger->rotation_deg));
     }
     return {};
   }
   observation.trigger = trigger;
   if (std::abs(observation.rotation_deg - trigger.rotation_deg) > kSameRotationDeg) {
-    session.warnings.insert(fmt::format("observation {}: imprints say rotation {} deg, the trigger {} deg; the trigger's is used",
-                                        trigger.observation, observation.rotation_deg, trigger.rotation_deg));
+    session.warnings.insert(
+        fmt::format("observation {}: imprints say rotation {} deg, the trigger {} deg; the trigger's is used",
+                    trigger.observation, observation.rotation_deg, trigger.rotation_deg));
     observation.rotation_deg = trigger.rotation_deg;
     session.due = session.due || observation.settled;
   }
@@ -85,8 +94,9 @@ Arrival ObservationAssembler::add(const Imprint& imprint, Time now) {
   Session& session = open_session(imprint.session, now);
   Pending& observation = open_observation(session, imprint.observation, imprint.rotation_deg, now);
   if (std::abs(observation.rotation_deg - imprint.rotation_deg) > kSameRotationDeg) {
-    session.warnings.insert(fmt::format("observation {}: {} says rotation {} deg, but {} deg is used", imprint.observation,
-                                        imprint.camera_id, imprint.rotation_deg, observation.rotation_deg));
+    session.warnings.insert(fmt::format("observation {}: {} says rotation {} deg, but {} deg is used",
+                                        imprint.observation, imprint.camera_id, imprint.rotation_deg,
+                                        observation.rotation_deg));
   }
   const auto held = observation.imprints.find(imprint.camera_id);
   if (held == observation.imprints.end()) {
@@ -200,7 +210,8 @@ std::vector<ObservationState> ObservationAssembler::states(const std::string& na
   const Session* session = find(name);
   if (session == nullptr) return states;
   for (const auto& [index, observation] : session->observations) {
-    ObservationState state{static_cast<int>(index), observation.rotation_deg, observation.settled, {}, waiting_for(observation)};
+    ObservationState state{
+        static_cast<int>(index), observation.rotation_deg, observation.settled, {}, waiting_for(observation)};
     for (const auto& [camera, imprint] : observation.imprints) state.reported.push_back(camera);
     states.push_back(std::move(state));
   }

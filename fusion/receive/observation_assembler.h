@@ -16,8 +16,8 @@
 namespace imprint {
 
 struct AssemblerConfig {
-  double deadline_s = 10.0;         // from the first sign of an observation to its evaluation without the rest; ours
-  std::size_t max_sessions = 16;    // sessions held in memory; a settled one longest untouched leaves first; ours
+  double deadline_s = 10.0;       // from the first sign of an observation to its evaluation without the rest; ours
+  std::size_t max_sessions = 16;  // sessions held in memory; a settled one longest untouched leaves first; ours
   std::uint32_t max_observations = 64;  // of one session; ours
 
   [[nodiscard]] Result<void> validate() const;

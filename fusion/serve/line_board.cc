@@ -76,10 +76,10 @@ json to_json(const StoredResult& result) {
 }
 
 json to_json(const SessionSummary& summary) {
-  json document = {{"session", summary.session},           {"complete", summary.complete},
-                   {"error", summary.error},               {"made_at", utc_text(summary.made_ns)},
-                   {"revision", summary.revision},         {"observations", summary.observations},
-                   {"length_mm", nullptr},                 {"max_deflection_mm", nullptr}};
+  json document = {{"session", summary.session},   {"complete", summary.complete},
+                   {"error", summary.error},       {"made_at", utc_text(summary.made_ns)},
+                   {"revision", summary.revision}, {"observations", summary.observations},
+                   {"length_mm", nullptr},         {"max_deflection_mm", nullptr}};
   if (summary.length_mm) document["length_mm"] = *summary.length_mm;
   if (summary.max_deflection_mm) document["max_deflection_mm"] = *summary.max_deflection_mm;
   return document;
@@ -88,7 +88,8 @@ json to_json(const SessionSummary& summary) {
 LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started)
     : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
   for (const std::string& id : camera_ids) cameras_[id];
-  for (const char* counter : {"imprints", "repeated", "surplus", "refused", "malformed", "missed", "dropped", "results"}) {
+  for (const char* counter :
+       {"imprints", "repeated", "surplus", "refused", "malformed", "missed", "dropped", "results"}) {
     counters_[counter] = 0;
   }
 }
@@ -166,17 +167,10 @@ json LineBoard::status(Time now) const {
   }
   json alarms = json::array();
   for (const auto& [name, text] : alarms_) alarms.push_back({{"name", name}, {"text", text}});
-  return {{"schema", "imprint.status/1"},
-          {"site", identity_.site},
-          {"line", identity_.line},
-          {"method", identity_.method},
-          {"version", identity_.version},
-          {"uptime_s", age_s(started_, now)},
-          {"cameras", std::move(cameras)},
-          {"session", std::move(session)},
-          {"last_result", last_result_},
-          {"counters", counters_},
-          {"alarms", std::move(alarms)}};
+  return {{"schema", "imprint.status/1"},  {"site", identity_.site},        {"line", identity_.line},
+          {"method", identity_.method},    {"version", identity_.version},  {"uptime_s", age_s(started_, now)},
+          {"cameras", std::move(cameras)}, {"session", std::move(session)}, {"last_result", last_result_},
+          {"counters", counters_},         {"alarms", std::move(alarms)}};
 }
 
 json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {

@@ -45,8 +45,8 @@ class HttpPageServer final : public PageServer {
     port_ = config.port == 0 ? server_.bind_to_any_port(config.address)
                              : (server_.bind_to_port(config.address, config.port) ? config.port : -1);
     if (port_ <= 0) {
-      return job_failed("page: cannot listen on {}:{}; is the address this machine's and the port free?", config.address,
-                        config.port);
+      return job_failed("page: cannot listen on {}:{}; is the address this machine's and the port free?",
+                        config.address, config.port);
     }
     thread_ = std::thread([this] { server_.listen_after_bind(); });
     while (!server_.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stop() before is lost
@@ -60,11 +60,12 @@ class HttpPageServer final : public PageServer {
     server_.set_payload_max_length(kMaxRequestBytes);
     server_.set_read_timeout(kIdleTimeout_s);
     server_.set_keep_alive_timeout(kIdleTimeout_s);
-    server_.set_default_headers({{"Cache-Control", "no-store"},
-                                 {"X-Content-Type-Options", "nosniff"},
-                                 {"X-Frame-Options", "DENY"},
-                                 {"Content-Security-Policy",
-                                  "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"}});
+    server_.set_default_headers(
+        {{"Cache-Control", "no-store"},
+         {"X-Content-Type-Options", "nosniff"},
+         {"X-Frame-Options", "DENY"},
+         {"Content-Security-Policy",
+          "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"}});
     server_.set_exception_handler([](const httplib::Request&, httplib::Response& response, const std::exception_ptr&) {
       answer_error(response, 500, "internal error");
     });
@@ -77,14 +78,16 @@ class HttpPageServer final : public PageServer {
     server_.Get("/api/cameras", [this](const httplib::Request&, httplib::Response& response) {
       answer_json(response, {{"cameras", board_.status(std::chrono::steady_clock::now())["cameras"]}});
     });
-    server_.Get("/api/sessions", [this](const httplib::Request&, httplib::Response& response) { answer_sessions(response); });
+    server_.Get("/api/sessions",
+                [this](const httplib::Request&, httplib::Response& response) { answer_sessions(response); });
     server_.Get("/api/result/latest", [this](const httplib::Request&, httplib::Response& response) {
       answer_result(response, store_.latest_result(), "no result yet");
     });
-    server_.Get(R"(/api/result/([A-Za-z0-9_.\-]{1,64}))", [this](const httplib::Request& request, httplib::Response& response) {
-      const std::string session = request.matches[1];
-      answer_result(response, store_.result(session), "no result of session " + session);
-    });
+    server_.Get(R"(/api/result/([A-Za-z0-9_.\-]{1,64}))",
+                [this](const httplib::Request& request, httplib::Response& response) {
+                  const std::string session = request.matches[1];
+                  answer_result(response, store_.result(session), "no result of session " + session);
+                });
     server_.Get("/healthz", [this](const httplib::Request&, httplib::Response& response) {
       const bool healthy = !board_.has_alarm();
       answer_json(response, {{"healthy", healthy}}, healthy ? 200 : 503);
@@ -121,7 +124,8 @@ Result<void> PageConfig::validate() const {
   return {};
 }
 
-Result<std::unique_ptr<PageServer>> PageServer::start(const PageConfig& config, const LineBoard& board, SessionStore& store) {
+Result<std::unique_ptr<PageServer>> PageServer::start(const PageConfig& config, const LineBoard& board,
+                                                      SessionStore& store) {
   auto server = std::make_unique<HttpPageServer>(board, store);
   if (auto listening = server->listen(config); !listening) return pass_on(listening.error());
   return server;

@@ -21,7 +21,8 @@ struct PageConfig {
 class PageServer {
  public:
   /// Serves until destroyed; `board` and `store` must outlive it. Fails (job_failed) when the port is taken.
-  static Result<std::unique_ptr<PageServer>> start(const PageConfig& config, const LineBoard& board, SessionStore& store);
+  static Result<std::unique_ptr<PageServer>> start(const PageConfig& config, const LineBoard& board,
+                                                   SessionStore& store);
   virtual ~PageServer() = default;
 
   [[nodiscard]] virtual int port() const = 0;

@@ -57,8 +57,9 @@ class SqliteStore final : public SessionStore {
   Result<void> prepare() {
     const int version = db_.execAndGet("PRAGMA user_version").getInt();
     if (version > kSchemaVersion) {
-      return invalid_input("{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
-                           path_.string(), version, kSchemaVersion);
+      return invalid_input(
+          "{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
+          path_.string(), version, kSchemaVersion);
     }
     if (version == 0 && db_.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0) {
       return invalid_input("{}: a database of another program; name another file", path_.string());
@@ -74,11 +75,13 @@ class SqliteStore final : public SessionStore {
     return {};
   }
 
-  Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes, std::int64_t received_ns) override {
+  Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes,
+                           std::int64_t received_ns) override {
     return guarded<bool>([&] {
-      SQLite::Statement insert(db_,
-                               "INSERT OR IGNORE INTO message(session, observation, received_ns, camera, boot_id, sequence, bytes) "
-                               "VALUES (?, ?, ?, ?, ?, ?, ?)");
+      SQLite::Statement insert(
+          db_,
+          "INSERT OR IGNORE INTO message(session, observation, received_ns, camera, boot_id, sequence, bytes) "
+          "VALUES (?, ?, ?, ?, ?, ?, ?)");
       insert.bind(4, imprint.camera_id);
       insert.bind(5, static_cast<std::int64_t>(imprint.boot_id));  // the same 64 bits
       insert.bind(6, static_cast<std::int64_t>(imprint.sequence));
@@ -86,9 +89,11 @@ class SqliteStore final : public SessionStore {
     });
   }
 
-  Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes, std::int64_t received_ns) override {
+  Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes,
+                           std::int64_t received_ns) override {
     return guarded<bool>([&] {
-      SQLite::Statement insert(db_, "INSERT OR IGNORE INTO message(session, observation, received_ns, bytes) VALUES (?, ?, ?, ?)");
+      SQLite::Statement insert(
+          db_, "INSERT OR IGNORE INTO message(session, observation, received_ns, bytes) VALUES (?, ?, ?, ?)");
       return run_insert(insert, trigger.session, trigger.observation, received_ns, bytes, 4);
     });
   }
@@ -110,9 +115,10 @@ WHERE complete <> excluded.complete OR error <> excluded.error OR json <> exclud
       put.bind(4, result.json);
       put.bind(5, result.made_ns);
       put.exec();
-      SQLite::Statement evaluated(db_,
-                                  "UPDATE result SET last_message = (SELECT ifnull(max(id), 0) FROM message WHERE session = ?1) "
-                                  "WHERE session = ?1 RETURNING revision");
+      SQLite::Statement evaluated(
+          db_,
+          "UPDATE result SET last_message = (SELECT ifnull(max(id), 0) FROM message WHERE session = ?1) "
+          "WHERE session = ?1 RETURNING revision");
       evaluated.bind(1, result.session);
       evaluated.executeStep();
       const std::int64_t revision = evaluated.getColumn(0).getInt64();
@@ -148,9 +154,14 @@ FROM result ORDER BY revision DESC LIMIT ?)sql");
       select.bind(1, limit);
       std::vector<SessionSummary> summaries;
       while (select.executeStep()) {
-        SessionSummary summary{select.getColumn(0).getString(), select.getColumn(1).getInt() != 0,
-                               select.getColumn(2).getString(), select.getColumn(3).getInt64(),
-                               select.getColumn(4).getInt64(), {}, {}, select.getColumn(7).getInt64()};
+        SessionSummary summary{select.getColumn(0).getString(),
+                               select.getColumn(1).getInt() != 0,
+                               select.getColumn(2).getString(),
+                               select.getColumn(3).getInt64(),
+                               select.getColumn(4).getInt64(),
+                               {},
+                               {},
+                               select.getColumn(7).getInt64()};
         if (!select.isColumnNull(5)) summary.length_mm = select.getColumn(5).getDouble();
         if (!select.isColumnNull(6)) summary.max_deflection_mm = select.getColumn(6).getDouble();
         summaries.push_back(std::move(summary));
@@ -187,13 +198,15 @@ ORDER BY newest)sql");
 
   Result<std::vector<StoredMessage>> messages(const std::string& session) override {
     return guarded<std::vector<StoredMessage>>([&] {
-      SQLite::Statement select(db_, "SELECT camera IS NULL, received_ns, bytes FROM message WHERE session = ? ORDER BY id");
+      SQLite::Statement select(db_,
+                               "SELECT camera IS NULL, received_ns, bytes FROM message WHERE session = ? ORDER BY id");
       select.bind(1, session);
       std::vector<StoredMessage> messages;
       while (select.executeStep()) {
         const SQLite::Column blob = select.getColumn(2);
         const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
-        messages.push_back({select.getColumn(0).getInt() != 0, select.getColumn(1).getInt64(), {bytes, bytes + blob.getBytes()}});
+        messages.push_back(
+            {select.getColumn(0).getInt() != 0, select.getColumn(1).getInt64(), {bytes, bytes + blob.getBytes()}});
       }
       return messages;
     });

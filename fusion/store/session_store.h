@@ -18,10 +18,10 @@ namespace imprint {
 struct StoredResult {
   std::string session;
   bool complete = false;
-  std::string error;           ///< why there is no measurement; empty when there is
-  std::string json;            ///< `imprint.result/1`; empty when there is no measurement
-  std::int64_t made_ns = 0;    ///< since the Unix epoch
-  std::int64_t revision = 0;   ///< counts every result of every session, from 1
+  std::string error;          ///< why there is no measurement; empty when there is
+  std::string json;           ///< `imprint.result/1`; empty when there is no measurement
+  std::int64_t made_ns = 0;   ///< since the Unix epoch
+  std::int64_t revision = 0;  ///< counts every result of every session, from 1
 };
 
 /// One line of the list of sessions; figures are absent when there is no measurement.
@@ -55,9 +55,11 @@ class SessionStore {
 
   /// False when this imprint (camera, boot, sequence) is already stored. All writes fail (job_failed) with the
   /// database's own words, e.g. when the disk is full, and have then changed nothing.
-  virtual Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes, std::int64_t received_ns) = 0;
+  virtual Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes,
+                                   std::int64_t received_ns) = 0;
   /// False when the same trigger is already stored.
-  virtual Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes, std::int64_t received_ns) = 0;
+  virtual Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes,
+                                   std::int64_t received_ns) = 0;
   /// Replaces the session's result and gives its revision; the old one's when nothing but `made_ns` is new.
   virtual Result<std::int64_t> put_result(const StoredResult& result) = 0;
 

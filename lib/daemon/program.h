@@ -43,9 +43,10 @@ ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults);
 std::string read_choice(TomlReader& read, std::string_view key, std::span<const std::string_view> choices,
                         std::optional<std::string> fallback);
 /// The edge methods of contract section 3, and the levels of lib/log.
-inline constexpr auto kMethods = std::to_array<std::string_view>(
-    {"best", "orientation", "magnitude", "combined", "uniform", "none", "pixel"});
-inline constexpr auto kLogLevels = std::to_array<std::string_view>({"trace", "debug", "info", "warning", "error", "off"});
+inline constexpr auto kMethods =
+    std::to_array<std::string_view>({"best", "orientation", "magnitude", "combined", "uniform", "none", "pixel"});
+inline constexpr auto kLogLevels =
+    std::to_array<std::string_view>({"trace", "debug", "info", "warning", "error", "off"});
 
 /// A TOML string, number or list for --print-config.
 std::string toml_text(std::string_view text);

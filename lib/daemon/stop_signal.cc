@@ -30,8 +30,10 @@ bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
     const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(until - steady_clock::now()).count();
     if (left <= 0) return false;
     const timespec wait{static_cast<std::time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
-    if (sigtimedwait(&set, nullptr, &wait) > 0) stopped_ = true;
-    else if (errno == EAGAIN) return false;
+    if (sigtimedwait(&set, nullptr, &wait) > 0)
+      stopped_ = true;
+    else if (errno == EAGAIN)
+      return false;
   }
   return true;
 }

@@ -45,8 +45,8 @@ class SessionSource final : public FrameSource {
 
   Result<Frame> capture(const CaptureRequest& request) override {
     if (request.observation < 0 || static_cast<std::size_t>(request.observation) >= session_.observations.size()) {
-      return invalid_input("{}: has {} observation(s), triggered was number {}", file_.string(), session_.observations.size(),
-                           request.observation);
+      return invalid_input("{}: has {} observation(s), triggered was number {}", file_.string(),
+                           session_.observations.size(), request.observation);
     }
     const SessionObservation& observation = session_.observations[static_cast<std::size_t>(request.observation)];
     const auto image = observation.images.find(camera_id_);
@@ -69,7 +69,8 @@ class SessionSource final : public FrameSource {
 
 }  // namespace
 
-Result<std::unique_ptr<FrameSource>> open_folder_source(const std::filesystem::path& folder, const std::string& camera_id) {
+Result<std::unique_ptr<FrameSource>> open_folder_source(const std::filesystem::path& folder,
+                                                        const std::string& camera_id) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored)) {
     return invalid_input("{}: expected a folder with the pictures of {}, found none", folder.string(), camera_id);
@@ -77,7 +78,8 @@ Result<std::unique_ptr<FrameSource>> open_folder_source(const std::filesystem::p
   return std::make_unique<FolderSource>(folder, camera_id);
 }
 
-Result<std::unique_ptr<FrameSource>> open_session_source(const std::filesystem::path& file, const std::string& camera_id) {
+Result<std::unique_ptr<FrameSource>> open_session_source(const std::filesystem::path& file,
+                                                         const std::string& camera_id) {
   auto session = read_session_file(file);
   if (!session) return pass_on(session.error());
   if (std::ranges::none_of(session->observations, [&](const auto& o) { return o.images.contains(camera_id); })) {

@@ -28,7 +28,8 @@ class SimulationSource final : public FrameSource {
 
 }  // namespace
 
-Result<std::unique_ptr<FrameSource>> open_simulation_source(const std::filesystem::path& scene, const std::string& camera_id) {
+Result<std::unique_ptr<FrameSource>> open_simulation_source(const std::filesystem::path& scene,
+                                                            const std::string& camera_id) {
   auto read = read_scene(scene);
   if (!read) return pass_on(read.error());
   return std::make_unique<SimulationSource>(scene.string(), std::move(*read), camera_id);

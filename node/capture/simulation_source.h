@@ -11,6 +11,7 @@ namespace imprint {
 
 /// A simulated camera: renders the triggered observation of a scene file, as `imprint simulate` would have.
 /// Fails (invalid_input) when the scene cannot be read.
-Result<std::unique_ptr<FrameSource>> open_simulation_source(const std::filesystem::path& scene, const std::string& camera_id);
+Result<std::unique_ptr<FrameSource>> open_simulation_source(const std::filesystem::path& scene,
+                                                            const std::string& camera_id);
 
 }  // namespace imprint

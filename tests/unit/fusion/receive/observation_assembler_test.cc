@@ -12,15 +12,15 @@ using Time = ObservationAssembler::Time;
 
 const Time kStart = Time(std::chrono::hours(100));
 
-Time after(double s) {
-  return kStart + std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(s));
-}
+Time after(double s) { return kStart + std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(s)); }
 
 ObservationAssembler three_cameras(std::size_t max_sessions = 16) {
-  return ObservationAssembler({"cam1", "cam2", "cam3"}, {.deadline_s = 10.0, .max_sessions = max_sessions, .max_observations = 8});
+  return ObservationAssembler({"cam1", "cam2", "cam3"},
+                              {.deadline_s = 10.0, .max_sessions = max_sessions, .max_observations = 8});
 }
 
-Trigger trigger(std::uint32_t observation, double rotation_deg, std::uint32_t expected, const std::string& session = "S") {
+Trigger trigger(std::uint32_t observation, double rotation_deg, std::uint32_t expected,
+                const std::string& session = "S") {
   return {session, observation, rotation_deg, 0, expected};
 }
 
@@ -87,8 +87,10 @@ TEST_CASE("receive: after the deadline the missing cameras are named with why") 
   const auto observation = assembler.observations("S").at(0);
   REQUIRE(observation.imprints.size() == 1);
   REQUIRE(observation.missing.size() == 2);
-  REQUIRE(observation.missing[0] == std::pair<std::string, std::string>("cam2", "not connected, no imprint within 10 s"));
-  REQUIRE(observation.missing[1] == std::pair<std::string, std::string>("cam3", "connected, but no imprint within 10 s"));
+  REQUIRE(observation.missing[0] ==
+          std::pair<std::string, std::string>("cam2", "not connected, no imprint within 10 s"));
+  REQUIRE(observation.missing[1] ==
+          std::pair<std::string, std::string>("cam3", "connected, but no imprint within 10 s"));
   REQUIRE(assembler.complete("S"));
 }
 
@@ -261,7 +263,8 @@ TEST_CASE("receive: memory stays bounded, a session still open outlives the sett
   REQUIRE(assembler.add(trigger(0, 0.0, 1, "open"), after(0)));
   for (int i = 0; i < 100; ++i) {
     const std::string name = fmt::format("S{}", i);
-    for (const char* camera : {"cam1", "cam2", "cam3"}) assembler.add(answer(camera, 0, 0.0, 1, 1, name), after(0.01 * i));
+    for (const char* camera : {"cam1", "cam2", "cam3"})
+      assembler.add(answer(camera, 0, 0.0, 1, 1, name), after(0.01 * i));
     REQUIRE(assembler.settle(after(0.01 * i)).size() == 1);
     REQUIRE(assembler.sessions().size() <= 4);
   }

@@ -39,7 +39,8 @@ TEST_CASE("page: it is one document that needs nothing from elsewhere") {
   const auto [status, body] = server.get("/");
   REQUIRE(status == 200);
   REQUIRE(body.find("</html>") != std::string::npos);
-  for (const char* reference : {"src=\"", "href=\"", "@import", "url("}) REQUIRE(body.find(reference) == std::string::npos);
+  for (const char* reference : {"src=\"", "href=\"", "@import", "url("})
+    REQUIRE(body.find(reference) == std::string::npos);
 }
 
 TEST_CASE("page: the API gives the status, the sessions and each result") {
@@ -69,7 +70,8 @@ TEST_CASE("page: an alarm turns the health check to 503") {
 
 TEST_CASE("page: a port that is taken is said so, with the port") {
   const Server server;
-  const auto second = PageServer::start({.address = "127.0.0.1", .port = server.page->port()}, server.board, *server.store);
+  const auto second =
+      PageServer::start({.address = "127.0.0.1", .port = server.page->port()}, server.board, *server.store);
   REQUIRE_FALSE(second);
   REQUIRE(second.error().exit_status() == 1);
   REQUIRE(second.error().message.find(std::to_string(server.page->port())) != std::string::npos);

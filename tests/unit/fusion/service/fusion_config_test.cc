@@ -37,7 +37,8 @@ TEST_CASE("fusion config: the rig is enough; it routes on this machine only and 
 
 TEST_CASE("fusion config: what is printed reads back as the same config") {
   const TemporaryFolder folder;
-  const auto config = read(folder, "[fusion]\nrig = \"rig.toml\"\nresult_dir = \"out\"\ndeadline_s = 2.5\n[page]\nport = 0\n");
+  const auto config =
+      read(folder, "[fusion]\nrig = \"rig.toml\"\nresult_dir = \"out\"\ndeadline_s = 2.5\n[page]\nport = 0\n");
   REQUIRE(config);
   const auto again = read(folder, to_toml(*config));
   REQUIRE(again);
@@ -47,12 +48,16 @@ TEST_CASE("fusion config: what is printed reads back as the same config") {
 }
 
 TEST_CASE("fusion config: a fault names the file, the line and the key") {
-  REQUIRE(fault("[fusion]\nrig = \"r\"\ndeadline_s = 0\n").find("fusion.toml:3: fusion.deadline_s: ") != std::string::npos);
-  REQUIRE(fault("[fusion]\nrig = \"r\"\n[page]\nport = 99999999999\n").find("fusion.toml:4: page.port: ") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\ndeadline_s = 0\n").find("fusion.toml:3: fusion.deadline_s: ") !=
+          std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[page]\nport = 99999999999\n").find("fusion.toml:4: page.port: ") !=
+          std::string::npos);
   REQUIRE(fault("[fusion]\nrig = \"r\"\nsite = \"a/b\"\n").find("fusion.toml:3: fusion.site") != std::string::npos);
-  REQUIRE(fault("[fusion]\nrig = \"r\"\ndead_line_s = 3\n").find("fusion.toml:3: fusion.dead_line_s: unknown key") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\ndead_line_s = 3\n").find("fusion.toml:3: fusion.dead_line_s: unknown key") !=
+          std::string::npos);
   REQUIRE(fault("rig = \"r\"\n").find("unknown key") != std::string::npos);
-  REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = [7447]\n").find("zenoh.listen: expected a list of texts") != std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = [7447]\n").find("zenoh.listen: expected a list of texts") !=
+          std::string::npos);
   REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = []\n").find("zenoh.listen") != std::string::npos);
 }
 

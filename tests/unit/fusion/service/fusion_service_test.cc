@@ -78,8 +78,9 @@ struct Plant {
       rig.cameras.back().id = camera;
     }
     store = *SessionStore::open(folder / "imprint.db");
-    board = std::make_unique<LineBoard>(LineBoard::Identity{"plant", "L1", "best", "0"},
-                                        std::vector<std::string>{"cam1", "cam2", "cam3"}, std::chrono::steady_clock::now());
+    board =
+        std::make_unique<LineBoard>(LineBoard::Identity{"plant", "L1", "best", "0"},
+                                    std::vector<std::string>{"cam1", "cam2", "cam3"}, std::chrono::steady_clock::now());
     inside = open_memory(bus);
     fusion = std::make_unique<FusionService>(config, rig, *inside, *store, *board, count_imprints);
     REQUIRE(fusion->start());
@@ -95,7 +96,8 @@ struct Plant {
     REQUIRE(triggers->put(encode_trigger({session, observation, 90.0 * observation, 0, expected})));
   }
 
-  void answer(const std::string& camera, std::uint32_t observation, std::uint64_t sequence, const std::string& session = "S") {
+  void answer(const std::string& camera, std::uint32_t observation, std::uint64_t sequence,
+              const std::string& session = "S") {
     Imprint imprint;
     imprint.camera_id = camera;
     imprint.session = session;

@@ -19,7 +19,8 @@ std::unique_ptr<SessionStore> open(const std::filesystem::path& path) {
   return std::move(*store);
 }
 
-Imprint imprint_of(const std::string& camera, std::uint64_t sequence, const std::string& session = "S", std::uint64_t boot_id = 1) {
+Imprint imprint_of(const std::string& camera, std::uint64_t sequence, const std::string& session = "S",
+                   std::uint64_t boot_id = 1) {
   Imprint imprint;
   imprint.camera_id = camera;
   imprint.session = session;
@@ -69,7 +70,8 @@ TEST_CASE("store: a session has one result, with a revision that grows when it c
   auto store = open(folder / "a.db");
   REQUIRE(*store->put_result(result_of("S", false, "")) == 1);
   REQUIRE(*store->put_result(result_of("T", true, R"({"length_mm": 1500.5, "observations": [{}, {}]})")) == 2);
-  REQUIRE(*store->put_result(result_of("S", true, R"({"length_mm": 2.0, "max_deflection_mm": 1.5, "observations": []})")) == 3);
+  REQUIRE(*store->put_result(
+              result_of("S", true, R"({"length_mm": 2.0, "max_deflection_mm": 1.5, "observations": []})")) == 3);
   auto unchanged = result_of("S", true, R"({"length_mm": 2.0, "max_deflection_mm": 1.5, "observations": []})");
   unchanged.made_ns = 99;
   REQUIRE(*store->put_result(unchanged) == 3);

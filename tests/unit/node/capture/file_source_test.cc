@@ -57,8 +57,9 @@ TEST_CASE("capture: a session file gives its picture and a contradicting rotatio
   REQUIRE(turned->warnings.size() == 1);
   REQUIRE(turned->warnings[0].find("rotation 90 deg, the trigger 45 deg") != std::string::npos);
   REQUIRE((*source)->capture({"S", 2, 0.0}).error().message.find("has 2 observation(s)") != std::string::npos);
-  REQUIRE((*open_session_source(folder / "session.toml", "cam2"))->capture({"S", 0, 0.0}).error().message.find("cam2") !=
-          std::string::npos);
+  REQUIRE(
+      (*open_session_source(folder / "session.toml", "cam2"))->capture({"S", 0, 0.0}).error().message.find("cam2") !=
+      std::string::npos);
   REQUIRE_FALSE(open_session_source(folder / "session.toml", "cam3"));
 }
 

@@ -56,10 +56,13 @@ TEST_CASE("node config: what is printed reads back as the same config") {
 }
 
 TEST_CASE("node config: a fault names the file, the line and the key") {
-  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiod_s = -1\n").find("node.toml:9: health.period_s: ") != std::string::npos);
-  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiods = 1\n").find("node.toml:9: health.periods: unknown key") != std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiod_s = -1\n").find("node.toml:9: health.period_s: ") !=
+          std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[health]\nperiods = 1\n").find("node.toml:9: health.periods: unknown key") !=
+          std::string::npos);
   REQUIRE(fault("[node]\nrig = \"r\"\n").find("node.camera_id: missing") != std::string::npos);
-  REQUIRE(fault(std::string(kSmallest) + "[zenoh]\nconnect = [\"localhost\"]\n").find("zenoh.connect") != std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[zenoh]\nconnect = [\"localhost\"]\n").find("zenoh.connect") !=
+          std::string::npos);
 }
 
 TEST_CASE("node config: a fault of an override says that it is the command line's") {

@@ -217,7 +217,8 @@ TEST_CASE("node: its token is there while it runs and gone when it has stopped")
   }
   std::this_thread::sleep_for(100ms);
   const std::lock_guard lock(mutex);
-  REQUIRE(changes == std::vector<std::pair<std::string, bool>>{{line.keys.alive("cam1"), true}, {line.keys.alive("cam1"), false}});
+  REQUIRE(changes ==
+          std::vector<std::pair<std::string, bool>>{{line.keys.alive("cam1"), true}, {line.keys.alive("cam1"), false}});
 }
 
 }  // namespace imprint
