@@ -17,8 +17,10 @@ constexpr auto kBetweenTries = milliseconds(30);
 Result<LineLink> LineLink::open(const LineOptions& options) {
   auto keys = Keys::of(options.site, options.line);
   if (!keys) return pass_on(keys.error());
-  auto transport = open_zenoh({.connect = {options.connect}, .listen = {}, .router = false});
-  if (!transport) return pass_on(transport.error());
+  auto transport = open_zenoh({.connect = {options.connect}, .tool = true});
+  if (!transport) {
+    return pass_on({transport.error().kind, transport.error().message + "; is imprint-fusion running?"});
+  }
   return LineLink(options, std::move(*keys), std::move(*transport));
 }
 

@@ -297,7 +297,7 @@ void FusionService::make_result(const std::string& session) {
 void FusionService::announce(const StoredResult& result) {
   auto publisher = result_publishers_.find(result.session);
   if (publisher == result_publishers_.end()) {
-    auto opened = transport_.publish(keys_->result(result.session), {.traffic = Traffic::imprint, .history = 1});
+    auto opened = transport_.publish(keys_->result(result.session), {.traffic = Traffic::bulk, .history = 1});
     if (!opened) {
       spdlog::error("session {}: {}", result.session, opened.error().message);
       return;

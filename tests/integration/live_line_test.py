@@ -95,8 +95,8 @@ period_s = 0.5
             process.wait()
 
     def start(self, name, command):
-        log = open(self.folder / f"{name}.log", "ab")
-        self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log)
+        with open(self.folder / f"{name}.log", "ab") as log:
+            self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log)
 
     def start_fusion(self):
         self.start("fusion", [FUSION, "--config", self.fusion_config])
