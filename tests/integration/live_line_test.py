@@ -27,16 +27,13 @@ work = data = reference = rotations = None
 def setUpModule():
     global work, data, reference, rotations
     work = pathlib.Path(tempfile.mkdtemp(prefix="imprint-integration-"))
+    unittest.addModuleCleanup(shutil.rmtree, work, ignore_errors=True)
     data = work / "session"
     subprocess.run([IMPRINT, "simulate", SCENE, "--out", data], check=True, stdout=subprocess.DEVNULL)
     measured = subprocess.run([IMPRINT, "measure", data / "session.toml", "--json"], check=True, capture_output=True)
     reference = json.loads(measured.stdout)
     with open(data / "session.toml", "rb") as file:
         rotations = [observation["rotation_deg"] for observation in tomllib.load(file)["observation"]]
-
-
-def tearDownModule():
-    shutil.rmtree(work, ignore_errors=True)
 
 
 def free_port():
