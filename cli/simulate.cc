@@ -17,6 +17,7 @@ struct SimulateOptions {
   std::string folder;
   int jobs = 1;
   std::optional<std::int64_t> seed;
+  std::optional<std::size_t> observations;
 };
 
 // One line that is rewritten on a terminal, a line a frame elsewhere.
@@ -37,6 +38,14 @@ int simulate(const SimulateOptions& options, bool json) {
   auto scene = read_scene(options.scene);
   if (!scene) return fail(scene.error());
   if (options.seed) scene->seed = static_cast<std::uint64_t>(*options.seed);
+  if (options.observations) {
+    auto& rotations = scene->observations.rotations_deg;
+    if (*options.observations > rotations.size()) {
+      return fail({ErrorKind::invalid_input, fmt::format("--observations {}: {} has only {}", *options.observations,
+                                                         options.scene, rotations.size())});
+    }
+    rotations.resize(*options.observations);
+  }
   const auto written = write_simulation(*scene, options.folder, show_progress, options.jobs);
   if (!written) return fail(written.error());
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
@@ -68,6 +77,8 @@ void add_simulate_command(Cli& cli) {
   command->add_option("--out", options->folder, "folder for images, rig, session and truth; made if need be")
       ->required();
   command->add_option("--jobs", options->jobs, "frames rendered at a time")->check(CLI::Range(1, 256));
+  command->add_option("--observations", options->observations, "only the first so many of the scene's observations")
+      ->check(CLI::PositiveNumber);
   command->add_option("--seed", options->seed, "another forging, hall and noise: overrides the scene's seed");
 }
 
