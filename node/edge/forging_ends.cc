@@ -123,7 +123,7 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
   const bool invert = polarity == Polarity::dark;
   const double outward = search.at_start ? -1.0 : 1.0;
   const int inside_px = static_cast<int>(0.5 * search.diameter_px),
-            outside_px = static_cast<int>(1.2 * search.diameter_px);
+            outside_px = static_cast<int>(0.5 * search.diameter_px);
   std::vector<double> body;
   for (int k = -2 * inside_px; k < -inside_px / 2; ++k) {
     const double level = band_level(image, frame, search.station_px + outward * k, search, invert);

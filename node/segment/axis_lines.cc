@@ -106,8 +106,14 @@ RimPairs pairs_about_axis(const RimPairs& pairs, const WorkingImage& working, co
   for (std::size_t x = 0; x < pairs.columns.size(); ++x) {
     auto& column = near.columns[x];
     const auto axis = static_cast<float>(line.y_px(static_cast<double>(x)));
-    for (const RimPair& pair : pairs.columns[x])
-      if (pair.body >= least_body && std::abs(pair.middle_px() - axis) <= max_offset_px) column.push_back(pair);
+    for (RimPair pair : pairs.columns[x]) {
+      const float off = pair.middle_px() - axis;
+      if (pair.body < least_body || std::abs(off) > max_offset_px) continue;
+      // Steps of a forging share its axis; a rim with something else's edge has its middle elsewhere.
+      const float z = off / (1.0F + 0.04F * pair.width_px());
+      pair.weight /= 1 + z * z;
+      column.push_back(pair);
+    }
     if (rims.upper[x].empty() && rims.lower[x].empty()) continue;
     const ColumnSums sums(working.intensity, static_cast<int>(x));
     for (const bool upper : {true, false}) {

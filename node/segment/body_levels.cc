@@ -33,14 +33,14 @@ std::vector<float> smoothed(const std::vector<float>& values, int half) {
 }
 
 // The last column of the body when walking from `from` in steps of `step`.
-int walk(const BodyLevels& levels, int from, int step, double max_gap_px) {
+int walk(const BodyLevels& levels, int from, int step, float least_body, double max_gap_px) {
   constexpr float kStaysAbove = 0.6F, kMemory = 0.05F;  // of about 20 columns
   const int n = static_cast<int>(levels.body.size());
   float brightness = levels.body[static_cast<std::size_t>(from)];
   int last = from;
   for (int x = from; x >= 0 && x < n && std::abs(x - last) <= max_gap_px; x += step) {
     const float body = levels.body[static_cast<std::size_t>(x)], ground = levels.ground[static_cast<std::size_t>(x)];
-    if (body - ground < kStaysAbove * (brightness - ground)) continue;
+    if (body < least_body || body - ground < kStaysAbove * (brightness - ground)) continue;
     brightness += kMemory * (body - brightness);
     last = x;
   }
@@ -82,7 +82,7 @@ double reach(const WorkingImage& working, const BodyLevels& levels, int x, doubl
 }  // namespace
 
 BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
-                          double max_gap_px) {
+                          float least_body, double max_gap_px) {
   constexpr double kStrip = 0.3;                        // of the width, to both sides of the axis: inside every step
   constexpr double kGroundFrom = 0.8, kGroundTo = 1.6;  // of the width: outside every step
   BodyLevels levels;
@@ -99,8 +99,8 @@ BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, dou
   }
   levels.body = smoothed(levels.body, 2);
   levels.ground = smoothed(levels.ground, 8);
-  levels.first_x_px = walk(levels, inside_x_px, -1, max_gap_px);
-  levels.last_x_px = walk(levels, inside_x_px, 1, max_gap_px);
+  levels.first_x_px = walk(levels, inside_x_px, -1, least_body, max_gap_px);
+  levels.last_x_px = walk(levels, inside_x_px, 1, least_body, max_gap_px);
   // Over scale the body is as bright as beside it.
   for (int x = levels.first_x_px + 1; x < levels.last_x_px; ++x) {
     auto& body = levels.body[static_cast<std::size_t>(x)];
@@ -129,6 +129,7 @@ std::vector<RimPair> rims_by_brightness(const WorkingImage& working, const AxisL
     };
     const auto axis_y = static_cast<float>(line.y_px(levels.first_x_px + k));
     RimPair pair;
+    pair.both = false;
     pair.upper_px = axis_y - around(above);
     pair.lower_px = axis_y + around(below);
     rims.push_back(pair);
@@ -136,19 +137,20 @@ std::vector<RimPair> rims_by_brightness(const WorkingImage& working, const AxisL
   return rims;
 }
 
-std::vector<std::vector<RimPair>> weigh_by_levels(const std::vector<std::vector<RimPair>>& pairs,
-                                                  const WorkingImage& working, const BodyLevels& levels) {
+RimPairs weigh_by_levels(const RimPairs& pairs, const WorkingImage& working, const BodyLevels& levels) {
   constexpr double kNear = 1.5, kFar = 4.0;  // reduced px off the rim: clear of its blur, still beside it
-  std::vector<std::vector<RimPair>> weighed(pairs.size());
+  RimPairs weighed = pairs;
+  for (auto& column : weighed.columns) column.clear();
   for (int x = std::max(0, levels.first_x_px); x <= levels.last_x_px; ++x) {
     const auto column = static_cast<std::size_t>(x);
-    for (RimPair pair : pairs[column]) {
+    for (RimPair pair : pairs.columns[column]) {
       const float body = levels.body[column], ground = levels.ground[column];
-      pair.weight *= rim_weight(mean(working, x, pair.upper_px + kNear, pair.upper_px + kFar),
-                                mean(working, x, pair.upper_px - kFar, pair.upper_px - kNear), body, ground) *
-                     rim_weight(mean(working, x, pair.lower_px - kFar, pair.lower_px - kNear),
-                                mean(working, x, pair.lower_px + kNear, pair.lower_px + kFar), body, ground);
-      if (pair.weight > 0.01F) weighed[column].push_back(pair);
+      const float upper = rim_weight(mean(working, x, pair.upper_px + kNear, pair.upper_px + kFar),
+                                     mean(working, x, pair.upper_px - kFar, pair.upper_px - kNear), body, ground);
+      const float lower = rim_weight(mean(working, x, pair.lower_px - kFar, pair.lower_px - kNear),
+                                     mean(working, x, pair.lower_px + kNear, pair.lower_px + kFar), body, ground);
+      pair.weight *= pair.both ? upper * lower : std::max(upper, lower);  // of a mirrored pair one is no rim
+      if (pair.weight > 0.01F) weighed.columns[column].push_back(pair);
     }
   }
   return weighed;

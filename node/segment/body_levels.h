@@ -15,9 +15,10 @@ struct BodyLevels {
 };
 
 /// Levels along `line` for a body about `width_px` wide, and how far the body reaches to both sides of column
-/// `inside_x_px`: until it stays darker than 60 % of its last brightness for longer than `max_gap_px`.
+/// `inside_x_px`: until it stays darker than 60 % of its last brightness, or than `least_body`, for longer than
+/// `max_gap_px`.
 BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
-                          double max_gap_px);
+                          float least_body, double max_gap_px);
 
 /// Where the body's brightness ends on both sides, for each of its columns: rough, but there where a rim has no edge of
 /// its own. Weights are 0.
@@ -26,7 +27,6 @@ std::vector<RimPair> rims_by_brightness(const WorkingImage& working, const AxisL
 
 /// Pairs weighed by what the levels say: a rim's inner side is as bright as the body there, which the edge of a beam
 /// behind it is not, and its outer side is darker. Pairs outside the body's columns go.
-std::vector<std::vector<RimPair>> weigh_by_levels(const std::vector<std::vector<RimPair>>& pairs,
-                                                  const WorkingImage& working, const BodyLevels& levels);
+RimPairs weigh_by_levels(const RimPairs& pairs, const WorkingImage& working, const BodyLevels& levels);
 
 }  // namespace imprint

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "node/segment/axis_lines.h"
+#include "node/segment/body_levels.h"
 #include "node/segment/body_path.h"
 #include "node/segment/rim_candidates.h"
 #include "node/segment/segment_config.h"
@@ -104,6 +105,51 @@ BodyPath find_body(const RimPairs& pairs, const RimCandidates& rims, const Worki
   return best == bodies.end() ? BodyPath{} : best->path;
 }
 
+// Columns without a pair, in long gaps and towards the ends, get the rough rims.
+void fill_gaps(BodyPath& path, const std::vector<RimPair>& rough, int first_x_px) {
+  constexpr int kBridged = 8;  // columns over which a straight line serves
+  std::vector<BodyPath::Column> filled;
+  int before = first_x_px - kBridged - 1;
+  const auto fill_to = [&](int next) {
+    if (next - before <= kBridged) return;
+    for (int x = before + 1; x < next; ++x) {
+      const int k = x - first_x_px;
+      if (k >= 0 && k < static_cast<int>(rough.size())) filled.push_back({x, rough[static_cast<std::size_t>(k)]});
+    }
+  };
+  for (const auto& column : path.columns) {
+    fill_to(column.x_px);
+    filled.push_back(column);
+    before = column.x_px;
+  }
+  fill_to(first_x_px + static_cast<int>(rough.size()) + kBridged);
+  path.columns = std::move(filled);
+}
+
+// The body once more, now that its brightness is known: beams that pass behind it drop out, and it is followed to
+// where its brightness ends rather than to where both rims are last seen.
+BodyPath refine_body(const BodyPath& found, const RimPairs& pairs, const RimCandidates& rims,
+                     const WorkingImage& working, double max_offset_px, const SegmentConfig& config) {
+  const AxisLine line = fit_axis(found);
+  const double width = found.median_width_px();
+  const float least_body = least_body_level(found, working, config);
+  // From a column that surely belongs to the body, as near to its middle as there is one.
+  int inside = found.columns.front().x_px, nearest = working.intensity.cols;
+  const int middle = found.columns[found.columns.size() / 2].x_px;
+  for (const auto& c : found.columns)
+    if (c.pair.both && c.pair.body >= least_body && std::abs(c.x_px - middle) < nearest)
+      nearest = std::abs(c.x_px - middle), inside = c.x_px;
+  const BodyLevels levels = measure_levels(working, line, width, inside, least_body, config.max_gap_diameters * width);
+  const RimPairs near =
+      pairs_about_axis(pairs, working, rims, line, max_offset_px, least_body, config.max_rims_per_column);
+  BodyPath refined =
+      follow_body(weigh_by_levels(near, working, levels), working, line, max_offset_px, 2.0 * config.max_gap_diameters);
+  if (refined.length_px() < 0.5 * found.length_px()) return found;
+  const std::vector<RimPair> rough = rims_by_brightness(working, line, levels, width);
+  fill_gaps(refined, rough, levels.first_x_px);
+  return refined;
+}
+
 struct RimSample {
   double station_px, upper_px, lower_px;
 };
@@ -156,10 +202,7 @@ Segmentation describe(const BodyPath& path, const WorkingImage& working, const S
   std::sort(samples.begin(), samples.end(),
             [](const RimSample& a, const RimSample& b) { return a.station_px < b.station_px; });
   const double width = path.median_width_px() * working.reduction;
-  resample_rims(samples, std::max(8.0 * working.reduction, config.max_gap_diameters * width), out);
-  out.score = static_cast<double>(
-                  std::count_if(path.columns.begin(), path.columns.end(), [](const auto& c) { return c.pair.both; })) /
-              path.length_px();
+  resample_rims(samples, std::max(8.0 * working.reduction, 2.0 * config.max_gap_diameters * width), out);
   return out;
 }
 
@@ -219,10 +262,14 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
         "no forging: the best body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is "
         "needed",
         best.length_px() * r, width * r, config.min_elongation);
-  Segmentation found = describe(best, working, config);
+  const BodyPath refined = refine_body(best, pairs, rims, working, max_offset, config);
+  Segmentation found = describe(refined, working, config);
+  const auto with_both =
+      std::count_if(best.columns.begin(), best.columns.end(), [](const auto& c) { return c.pair.both; });
+  found.score = std::min(1.0, static_cast<double>(with_both) / refined.length_px());
   if (found.score < config.min_score)
     return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",
-                      100 * found.score, best.length_px() * r, 100 * config.min_score);
+                      100 * found.score, refined.length_px() * r, 100 * config.min_score);
   return found;
 }
 

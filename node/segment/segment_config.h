@@ -21,7 +21,7 @@ struct SegmentConfig {
   double min_elongation = 2.0;            // seen length over diameter that makes a forging; ours
   double full_elongation = 5.0;           // beyond this, length is no further evidence: beams are long too; ours
   double center_reach = 0.35;             // off the image's middle by this share of its shorter side counts half; ours
-  double min_body_level = 0.35;           // of a section, share of the body's usual level over the background; ours
+  double min_body_level = 0.28;           // of a section, share of the body's usual level over the background; ours
   double min_score = 0.35;                // share of the length with both rims; ours
   double max_gap_diameters = 1.0;         // longest interruption bridged, in local diameters; ours
 
