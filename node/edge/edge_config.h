@@ -16,6 +16,7 @@ struct EdgeConfig {
   int max_candidates = 6;           // edges a scan line, the strongest; ours
   double jump_cost = 6.0;           // of leaving one edge for another, in well-seen stations; ours
   double outermost_share = 0.85;    // least worth of a body's outermost edge, share of the strongest's; ours
+  double detached_share = 0.8;      // worth of an edge behind which the level falls back to the background; ours
   int max_gap_stations = 300;       // longest stretch without edge that a rim is followed across; ours
   int blur_region_stations = 256;   // the blur is taken as constant over this length; ours
   double end_half_band = 0.35;      // rows on either side of the axis for the ends, share of the diameter; ours

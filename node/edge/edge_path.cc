@@ -122,15 +122,19 @@ void reward_outermost(const ScanLine& line, const SmoothLines& smooth, double sp
   const auto sample = [&](double position_px) {
     return std::clamp(static_cast<int>(std::lround((position_px - line.first_px) / spacing_px)), 0, line.count - 1);
   };
+  bool found = false;
   for (EdgeCandidate& peak : peaks) {
     const int before = sample(peak.position_px - 3), after = sample(peak.position_px + 3);
     const float background = level[before], body = level[after];
     const float fallen = background + 0.35F * (body - background);
     bool goes_on = true;
     for (int i = after; i < line.count && goes_on; ++i) goes_on = level[i] > fallen;
-    if (!goes_on) continue;
-    peak.reward = std::max(peak.reward, config.outermost_share * highest);
-    break;
+    if (!goes_on) {
+      peak.reward *= config.detached_share;
+    } else if (!found) {
+      peak.reward = std::max(peak.reward, config.outermost_share * highest);
+      found = true;
+    }
   }
 }
 
