@@ -180,6 +180,8 @@ Result<void> CombineConfig::validate() const {
   if (iterations < 2) return invalid_input("combine.iterations: at least 2 expected, found {}", iterations);
   if (!(rotation_tolerance_deg > 0.0) || !(placing_sigma_mm > 0.0) || !(end_tilt_sigma_deg > 0.0))
     return invalid_input("combine: rotation_tolerance_deg, placing_sigma_mm and end_tilt_sigma_deg above 0 expected");
+  if (!(interval_widening >= 1.0))
+    return invalid_input("combine.interval_widening: at least 1 expected, found {}", interval_widening);
   if (!(out_of_round_share > 0.0) || !(out_of_round_length_share > 0.0))
     return invalid_input("combine: out_of_round_share and out_of_round_length_share above 0 expected");
   return {};
@@ -229,6 +231,11 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
     return job_failed("the ends of the observations do not enclose a forging");
   align(*joint, ends, forging.end_section_mm, config.sections, combined);
   combined.length_sigma_mm = ends.length_sigma_mm();
+  for (CombinedSection& section : combined.sections) {
+    section.axis_covariance_mm2 *= config.interval_widening * config.interval_widening;
+    section.diameter_sigma_mm *= config.interval_widening;
+    section.circularity_sigma_mm *= config.interval_widening;
+  }
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const double own = (observations[k].end_world_mm - observations[k].start_world_mm).norm();
     if (std::abs(own - combined.length_mm) > config.max_length_difference_mm)

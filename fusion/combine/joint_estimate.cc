@@ -7,14 +7,16 @@
 
 #include <Eigen/Geometry>
 
+#include "fusion/combine/rod_surface.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
 namespace {
 
-constexpr int kCameraUnknowns = 2;  // its place across the axis, at both ends
-constexpr int kPlaceUnknowns = 6;   // shift x, y, z and turn about x, y, z of an observation
-constexpr double kFreedom = 4.0;    // of Student's t for the tangents
+constexpr int kCameraUnknowns = 2;    // its place across the axis, at both ends
+constexpr int kPlaceUnknowns = 6;     // shift x, y, z and turn about x, y, z of an observation
+constexpr double kFreedom = 4.0;      // of Student's t for the tangents
+constexpr double kPlaceShare = 0.02;  // variance of a station's place along x, in squared steps between nodes
 
 /// One camera of one observation.
 struct Viewer {
@@ -37,22 +39,16 @@ struct Row {
   bool used = false;
 };
 
-/// Where a tangent touches a section, and the line it is of the section there.
-struct SectionPoint {
-  double x_mm = 0.0;
-  Eigen::Vector3d normal;
-  double offset_mm = 0.0;
-};
-
-/// A row put into the equations.
+/// A row put into the equations: normal . c + support = value.
 struct Equation {
-  double x_mm = 0.0;
   std::size_t node = 0;
   double share = 0.0;  ///< of the next node
-  Eigen::Vector3d normal;
+  double along = 0.0;  ///< share of the length
   NodeVector coefficients = NodeVector::Zero();
   double value_mm = 0.0;
-  double across = 0.0;  ///< effect of the camera's place
+  double extra_variance_mm2 = 0.0;    ///< of the value, beside the tangent's own
+  double camera = 0.0;                ///< effect of the camera's place
+  Vector6d place = Vector6d::Zero();  ///< effect of the observation's place: shift, turn about the middle
 };
 
 class JointSolver {
@@ -85,9 +81,10 @@ class JointSolver {
   }
 
   std::optional<JointEstimate> run() {
-    for (int iteration = 0; iteration < config_.iterations; ++iteration) {
-      if (!iterate(iteration + 1 == config_.iterations)) return std::nullopt;
-    }
+    for (int iteration = 0; iteration < config_.iterations; ++iteration)
+      if (!improve(iteration + 1 == config_.iterations)) return std::nullopt;
+    std::vector<std::optional<Equation>> equations;
+    if (!solve(SectionPrior::Use::interval, equations)) return std::nullopt;
     JointEstimate estimate;
     estimate.step_mm = step_mm_;
     estimate.nodes = nodes_;
@@ -151,111 +148,52 @@ class JointSolver {
     }
   }
 
-  AxisCurve axis() const {
-    AxisCurve curve;
-    curve.x_step_mm = step_mm_;
-    for (const NodeVector& node : nodes_) {
-      curve.yz_mm.emplace_back(node(kY), node(kZ));
-      curve.slope.emplace_back(node(kYSlope), node(kZSlope));
-    }
-    return curve;
-  }
-
-  std::optional<Equation> equation_of(Row& row, const AxisCurve& curve) const {
+  std::optional<Equation> equation_of(Row& row, const RodSurface& rod) const {
     const Viewer& viewer = viewers_[row.viewer];
     const Placement& placement = placements_[viewer.observation];
     const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
-    const auto contact = touch(curve, center, placement.R * row.ray_world, row.x_mm);
+    const auto contact = rod.touch(center, placement.R * row.ray_world, row.x_mm);
     if (!contact) return std::nullopt;
-    row.x_mm = contact->x_mm;
-    const double position = row.x_mm / step_mm_;
-    const auto last = static_cast<double>(nodes_.size() - 1);
-    if (position < end_margin_ || position > last - end_margin_) return std::nullopt;
-    // Sections stand square to the working line, so the one touched is where the contact itself lies, and its normal
-    // has length 1 within it.
-    const double square = contact->normal.tail<2>().norm();
-    SectionPoint met{.x_mm = contact->x_mm + contact->distance_mm * contact->normal.x(),
-                     .normal = contact->normal / square,
-                     .offset_mm = contact->offset_mm / square};
-    const Eigen::Vector3d ray = placement.R * row.ray_world;
-    if (!settle_on_shoulder(curve, center + contact->range_mm * ray, ray, contact->distance_mm, met))
-      return std::nullopt;
+    row.x_mm = contact->nearest_x_mm;
+    const double margin = end_margin_ * step_mm_;
+    if (row.x_mm < margin || row.x_mm > length_mm_ - margin) return std::nullopt;
     Equation equation;
-    const double met_position = met.x_mm / step_mm_;
-    equation.x_mm = met.x_mm;
-    equation.node = static_cast<std::size_t>(std::clamp(std::floor(met_position), 0.0, last - 1.0));
-    equation.share = std::clamp(met_position - static_cast<double>(equation.node), 0.0, 1.0);
-    equation.normal = met.normal;
-    equation.value_mm = met.offset_mm - met.normal.x() * met.x_mm;
+    equation.extra_variance_mm2 = shoulder_variance_mm2(*contact);
+    equation.node = contact->node;
+    equation.share = contact->share;
+    equation.along = std::clamp(contact->x_mm / length_mm_, 0.0, 1.0);
+    equation.value_mm = contact->value_mm;
     NodeVector& g = equation.coefficients;
-    g(kY) = met.normal.y();
-    g(kZ) = met.normal.z();
+    g(kY) = contact->normal.x();
+    g(kZ) = contact->normal.y();
     g(kRadius) = 1.0;
-    g.tail<2 * kHarmonics>() = harmonics_at(std::atan2(met.normal.z(), met.normal.y()));
-    const Eigen::Vector3d view = (curve.at(met.x_mm).point_mm - center).normalized();
-    equation.across = met.normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
+    g.tail<2 * kHarmonics>() = contact->harmonics;
+    const Eigen::Vector3d& normal = contact->surface_normal;
+    const Eigen::Vector3d view = contact->point_mm - center;
+    equation.camera = normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
+    // A move of the observation moves the point on the ray, and with it the value: seen from the model, the other way.
+    const Eigen::Vector3d lever = contact->point_mm - Eigen::Vector3d(0.5 * length_mm_, 0.0, 0.0);
+    equation.place.head<3>() = -normal;
+    equation.place.tail<3>() = normal.cross(lever);
     return equation;
   }
 
-  static Eigen::Matrix<double, 2 * kHarmonics, 1> harmonics_at(double theta) {
-    Eigen::Matrix<double, 2 * kHarmonics, 1> values;
-    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
-      values(2 * (order - kFirstHarmonic)) = std::cos(order * theta);
-      values(2 * (order - kFirstHarmonic) + 1) = std::sin(order * theta);
+  /// On a shoulder the value hangs on where along x the ray touches, and so on the out-of-round as far as it is not
+  /// known yet.
+  double shoulder_variance_mm2(const RodSurface::Contact& contact) const {
+    const std::size_t last = nodes_.size() - 1;
+    const std::size_t a = contact.node > 0 ? contact.node - 1 : 0;
+    const std::size_t b = std::min(contact.node + 2, last);
+    const double slope = (nodes_[b](kRadius) - nodes_[a](kRadius)) / (static_cast<double>(b - a) * step_mm_);
+    double turning = 0.0;  // variance of d support / d theta
+    for (int k = kFirstHarmonic; k <= kLastHarmonic; ++k) {
+      const double variance =
+          own_.empty()
+              ? std::pow(prior_.harmonic_sigma_mm(k), 2)
+              : 0.5 * (own_[contact.node](cosine_of(k), cosine_of(k)) + own_[contact.node](sine_of(k), sine_of(k)));
+      turning += k * k * variance;
     }
-    return values;
-  }
-
-  /// Where a ray touches the rod when a thicker part stands close before or behind its closest point to the axis: on
-  /// the shoulder's edge, which then forms the outline. Moves `met` there. False where the two cannot be told apart.
-  bool settle_on_shoulder(const AxisCurve& curve, const Eigen::Vector3d& closest, const Eigen::Vector3d& ray,
-                          double distance_mm, SectionPoint& met) const {
-    constexpr double kShoulder = 0.02;   // of the radius; smaller steps hide nothing that matters
-    constexpr double kTouching = 0.001;  // of the radius
-    constexpr double kDoubtful = 0.01;
-    const double along = ray.x();
-    const double across_over_along = std::sqrt(1.0 - along * along) / std::max(std::abs(along), 1e-6);
-    const double reach = largest_radius_mm_ / across_over_along;
-    const auto last = static_cast<int>(nodes_.size()) - 1;
-    const auto node_at = [&](double x) { return std::clamp(static_cast<int>(std::lround(x / step_mm_)), 0, last); };
-    const double own = nodes_[static_cast<std::size_t>(node_at(met.x_mm))](kRadius);
-    double deepest = -std::numeric_limits<double>::infinity();
-    int shoulder = -1;
-    for (int i = node_at(met.x_mm - reach); i <= node_at(met.x_mm + reach); ++i) {
-      const double radius = nodes_[static_cast<std::size_t>(i)](kRadius);
-      if (radius < (1.0 + kShoulder) * own) continue;
-      const double travel = (i * step_mm_ - met.x_mm) * across_over_along;
-      const double depth = radius - std::hypot(distance_mm, travel);
-      if (depth <= deepest) continue;
-      deepest = depth;
-      shoulder = i;
-    }
-    if (shoulder < 0 || deepest < -kDoubtful * own) return true;
-    if (deepest < -kTouching * own) return false;
-    met.x_mm = shoulder * step_mm_;
-    const Eigen::Vector3d point = closest + (met.x_mm - closest.x()) / ray.x() * ray;
-    Eigen::Vector3d out = point - curve.at(met.x_mm).point_mm;
-    out.x() = 0.0;
-    met.normal = out.normalized();
-    met.offset_mm = met.normal.dot(point);
-    return true;
-  }
-
-  /// Columns of the observation's place: how the model at this tangent moves with it.
-  Vector6d place_effect(const Equation& equation, double x_mm) const {
-    const std::size_t i = equation.node;
-    const NodeVector node = (1.0 - equation.share) * nodes_[i] + equation.share * nodes_[i + 1];
-    const Eigen::Vector3d lever(x_mm - 0.5 * length_mm_, node(kY), node(kZ));
-    const NodeVector& g = equation.coefficients;
-    double turn = 0.0;
-    for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order)
-      turn += order * (node(sine_of(order)) * g(cosine_of(order)) - node(cosine_of(order)) * g(sine_of(order)));
-    Vector6d effect;
-    effect.head<3>() = -equation.normal;
-    effect(0) += (nodes_[i + 1](kRadius) - nodes_[i](kRadius)) / step_mm_;
-    effect.tail<3>() = equation.normal.cross(lever);
-    effect(3) += turn;
-    return effect;
+    return slope * slope * (contact.x_per_mm * contact.x_per_mm * turning + kPlaceShare * step_mm_ * step_mm_);
   }
 
   void add_camera_priors() {
@@ -291,30 +229,35 @@ class JointSolver {
     }
   }
 
-  bool iterate(bool final) {
+  /// The equations of this round, solved; false when they cannot be.
+  bool solve(SectionPrior::Use use, std::vector<std::optional<Equation>>& equations) {
     const int border =
         static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
     system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
-    prior_.add_to(system_);
+    prior_.add_to(system_, use);
     add_camera_priors();
     add_place_priors();
-    const AxisCurve curve = axis();
-    largest_radius_mm_ = 0.0;
-    for (const NodeVector& node : nodes_) largest_radius_mm_ = std::max(largest_radius_mm_, node(kRadius));
-    std::vector<std::optional<Equation>> equations;
+    const RodSurface rod(nodes_, step_mm_);
+    equations.clear();
     equations.reserve(rows_.size());
     for (Row& row : rows_) {
-      equations.push_back(equation_of(row, curve));
+      equations.push_back(equation_of(row, rod));
       if (equations.back()) add_equation(row, *equations.back());
     }
     if (!system_.solve()) return false;
     system_.node_covariances(own_, with_next_);
+    return true;
+  }
+
+  bool improve(bool last) {
+    std::vector<std::optional<Equation>> equations;
+    if (!solve(SectionPrior::Use::estimate, equations)) return false;
     nodes_ = system_.node_solution;
     camera_solution_ = system_.border_solution.head(camera_solution_.size());
     find_residuals(equations);
     move_places();
     // The last round leaves amounts and solution belonging to each other.
-    if (final) return true;
+    if (last) return true;
     learn_noise(equations);
     prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()));
     return true;
@@ -322,9 +265,8 @@ class JointSolver {
 
   void add_equation(const Row& row, const Equation& equation) {
     const std::size_t i = equation.node;
-    // On a shoulder half a step along the axis is worth more than the edge.
-    const double rise = nodes_[i + 1](kRadius) - nodes_[i](kRadius);
-    const double w = row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_ + 0.25 * rise * rise);
+    const double w =
+        row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_ + equation.extra_variance_mm2);
     const double next = equation.share;
     const double here = 1.0 - next;
     const NodeVector& g = equation.coefficients;
@@ -336,16 +278,14 @@ class JointSolver {
     system_.right[i + 1] += w * next * equation.value_mm * g;
 
     const Viewer& viewer = viewers_[row.viewer];
-    const double along = std::clamp(equation.x_mm / length_mm_, 0.0, 1.0);
     std::array<int, kCameraUnknowns + kPlaceUnknowns> columns{viewer.column, viewer.column + 1};
-    std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.across * (1.0 - along),
-                                                                 equation.across * along};
+    std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.camera * (1.0 - equation.along),
+                                                                 equation.camera * equation.along};
     std::size_t count = kCameraUnknowns;
     if (viewer.observation > 0) {
-      const Vector6d effect = place_effect(equation, equation.x_mm);
       for (int j = 0; j < kPlaceUnknowns; ++j) {
         columns[count] = place_column(viewer.observation) + j;
-        effects[count++] = effect(j);
+        effects[count++] = equation.place(j);
       }
     }
     const auto first = static_cast<Eigen::Index>(i) * kNodeUnknowns;
@@ -367,13 +307,11 @@ class JointSolver {
       const Viewer& viewer = viewers_[row.viewer];
       const NodeVector node =
           (1.0 - equation.share) * nodes_[equation.node] + equation.share * nodes_[equation.node + 1];
-      const double along = std::clamp(equation.x_mm / length_mm_, 0.0, 1.0);
-      double model =
-          equation.coefficients.dot(node) + equation.across * ((1.0 - along) * camera_solution_(viewer.column) +
-                                                               along * camera_solution_(viewer.column + 1));
+      double model = equation.coefficients.dot(node) +
+                     equation.camera * ((1.0 - equation.along) * camera_solution_(viewer.column) +
+                                        equation.along * camera_solution_(viewer.column + 1));
       if (viewer.observation > 0)
-        model += place_effect(equation, equation.x_mm)
-                     .dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
+        model += equation.place.dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
       row.residual_mm = equation.value_mm - model;
     }
   }
@@ -405,6 +343,11 @@ class JointSolver {
                             2.0 * here * e.share * g.dot(with_next_[e.node] * g);
       const double expected = row.residual_mm * row.residual_mm + fitted;
       const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
+      if (e.extra_variance_mm2 > variance) {
+        // What a shoulder leaves open is no scatter of the edge.
+        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2));
+        continue;
+      }
       // A tangent that the estimate bends itself to says less of the scatter.
       const double open = std::min(1.0, row.trust * fitted / (variance * correlation_));
       row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance);
@@ -432,7 +375,6 @@ class JointSolver {
   double length_mm_;
   double shift_sigma_mm_;
   double radius_mm_;
-  double largest_radius_mm_ = 0.0;
   double end_margin_;  ///< nodes next to an end whose tangents may belong to the end circle instead
   SectionPrior prior_;
   BorderedSystem system_;

@@ -9,6 +9,10 @@ namespace {
 /// Shape of the spectrum while only its size can be learnt: sigma falls as 1/k.
 double spectrum(int k) { return static_cast<double>(kFirstHarmonic) / k; }
 
+/// The process forgets sharply, a forging smoothly: weights made for the process lean on the ends of every stretch
+/// between two shoulders. For the estimate a shorter length keeps them even; the interval takes the whole.
+constexpr double kEstimateShare = 0.3;
+
 /// Precision of one step of an integrated random walk (value, slope) with unit density.
 Eigen::Matrix2d bend_precision(double h) {
   Eigen::Matrix2d covariance;
@@ -43,14 +47,15 @@ SectionPrior::SectionPrior(int nodes, double step_mm, double radius_mm, double o
     harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)] = out_of_round_share * radius_mm * spectrum(k);
 }
 
-void SectionPrior::add_to(BorderedSystem& system) const {
+void SectionPrior::add_to(BorderedSystem& system, Use use) const {
   const int n = system.nodes();
   const Eigen::Matrix2d bend = bend_precision(step_mm_) / bend_density_;
   Eigen::Matrix2d advance;
   advance << 1.0, step_mm_, 0.0, 1.0;
   const Eigen::Matrix2d bend_own = advance.transpose() * bend * advance;
   const Eigen::Matrix2d bend_cross = -advance.transpose() * bend;
-  const double keep = std::exp(-step_mm_ / harmonic_length_mm_);
+  const double length = use == Use::interval ? harmonic_length_mm_ : kEstimateShare * harmonic_length_mm_;
+  const double keep = std::exp(-step_mm_ / length);
   for (int i = 0; i < n; ++i) {
     const auto k = static_cast<std::size_t>(i);
     NodeMatrix& own = system.diagonal[k];

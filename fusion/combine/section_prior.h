@@ -27,7 +27,8 @@ class SectionPrior {
  public:
   SectionPrior(int nodes, double step_mm, double radius_mm, double out_of_round_share, double out_of_round_length_mm);
 
-  void add_to(BorderedSystem& system) const;
+  enum class Use { estimate, interval };
+  void add_to(BorderedSystem& system, Use use) const;
 
   /// Learns the amounts from estimates and their covariances (expectation maximisation). `observations` says how far
   /// the harmonics can be told apart: below three, their spectrum keeps its shape and only its size is learnt.

@@ -85,13 +85,14 @@ std::optional<RimContact> touch(const AxisCurve& axis, const Eigen::Vector3d& ce
 std::optional<Eigen::Vector3d> meet_end_circle(const AxisCurve& axis, const Eigen::Vector3d& center_mm,
                                                const Eigen::Vector3d& ray, double radius_mm, bool last,
                                                double x_guess_mm) {
+  // End faces stand square to the line rather than to the axis' own slope, which is least sure at the ends.
+  const Eigen::Vector3d direction = axis.R_line.row(0);
   double x_mm = x_guess_mm;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   for (int iteration = 0; iteration < 6; ++iteration) {
-    const AxisCurve::Place place = axis.at(x_mm);
-    const Eigen::Vector3d w = center_mm - place.point_mm;
-    const double along = ray.dot(place.direction);
-    const double camera_along = w.dot(place.direction);
+    const Eigen::Vector3d w = center_mm - axis.at(x_mm).point_mm;
+    const double along = ray.dot(direction);
+    const double camera_along = w.dot(direction);
     const double a = 1.0 - along * along;
     if (a < 1e-6) return std::nullopt;
     const double b = w.dot(ray) - camera_along * along;

@@ -201,15 +201,16 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
 
   AxisCurve axis = over_rims(agreeing->axis, rim_tangents(agreeing->views, agreeing->axis), config.sections);
   std::vector<FittedCircle> circles;
-  for (int iteration = 0; iteration < 3; ++iteration) {
+  for (int iteration = 0; iteration < 4; ++iteration) {
     circles = fit_circles(axis, rim_tangents(agreeing->views, axis));
     if (!(median_radius(circles, 0, circles.size()) > 0.0))
       return job_failed("no cross-section is seen by three rims: the stretches the cameras see do not overlap");
-    // Beyond the ends the outline follows the end circles, which must not bend the axis.
+    // Beyond the ends the outline follows the end circles, which must not bend the axis: they are cut off before the
+    // axis is first moved.
     const EndPlanes ends = find_ends(agreeing->views, axis, circles, forging.end_section_mm).planes;
     const double low = ends.first.seen ? ends.first.x_mm : axis.x_first_mm;
     const double high = ends.last.seen ? ends.last.x_mm : axis.x_first_mm + axis.x_step_mm * (config.sections - 1);
-    axis = moved_axis(axis, circles, config.axis_window);
+    if (iteration > 0) axis = moved_axis(axis, circles, config.axis_window);
     if (high - low > 10.0 * axis.x_step_mm) axis = over(axis, low, high, config.sections);
   }
   const std::vector<RimTangent> tangents = rim_tangents(agreeing->views, axis);
