@@ -1,7 +1,9 @@
 #include "lib/daemon/stop_signal.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdint>
 #include <ctime>
 
 namespace imprint {
@@ -28,8 +30,8 @@ bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
   const auto until = steady_clock::now() + timeout;
   while (!stopped_) {
     const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(until - steady_clock::now()).count();
-    if (left <= 0) return false;
-    const timespec wait{static_cast<std::time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
+    const auto rest = std::max<std::int64_t>(left, 0);
+    const timespec wait{static_cast<std::time_t>(rest / 1'000'000'000), static_cast<long>(rest % 1'000'000'000)};
     if (sigtimedwait(&set, nullptr, &wait) > 0)
       stopped_ = true;
     else if (errno == EAGAIN)

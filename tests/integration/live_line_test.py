@@ -133,6 +133,10 @@ period_s = 0.5
             raise AssertionError(f"trigger: {done.stderr}\n{self.logs()}")
         return json.loads(done.stdout)
 
+    def watch(self, *arguments):
+        return subprocess.Popen([IMPRINT, "watch", "--connect", self.endpoint, "--json", *map(str, arguments)],
+                                stdout=subprocess.PIPE)
+
     def result(self, session="S"):
         with urllib.request.urlopen(f"http://127.0.0.1:{self.page}/api/result/{session}", timeout=10) as answer:
             return json.load(answer)
@@ -158,9 +162,9 @@ class LiveLineTest(unittest.TestCase):
             line.start_fusion()
             line.start_nodes("cam1", "cam2", "cam3")
             line.wait_alive("cam1", "cam2", "cam3")
-            watch = subprocess.Popen([IMPRINT, "watch", "--connect", line.endpoint, "--results", "--count", str(len(rotations)),
-                                      "--timeout", str(3 * PATIENCE_S), "--json"], stdout=subprocess.PIPE)
-            time.sleep(1)  # the watch has nothing to say that it listens
+            results = line.watch("--results", "--count", len(rotations), "--timeout", 3 * PATIENCE_S)
+            everything = line.watch()
+            time.sleep(2)  # a watch says nothing when it begins to listen
             for observation in range(len(rotations)):
                 result = line.trigger(observation, len(rotations))
             self.assert_same_geometry(result, reference)
@@ -168,10 +172,15 @@ class LiveLineTest(unittest.TestCase):
             self.assertTrue(line.result()["complete"])
             written = json.loads((line.folder / "results" / "S" / "result.json").read_text())
             self.assertEqual(written, result)
-            events = json.loads(watch.communicate(timeout=PATIENCE_S)[0])
-            self.assertEqual(watch.returncode, 0)
+            events = json.loads(results.communicate(timeout=PATIENCE_S)[0])
+            self.assertEqual(results.returncode, 0)
             self.assertEqual([event["complete"] for event in events], [False] * (len(rotations) - 1) + [True])
             self.assertEqual(events[-1]["result"], result)
+            everything.send_signal(signal.SIGINT)
+            events = json.loads(everything.communicate(timeout=PATIENCE_S)[0])
+            self.assertEqual(everything.returncode, 0)
+            self.assertEqual({event["camera"] for event in events if event["event"] == "imprint"}, {"cam1", "cam2", "cam3"})
+            self.assertEqual({event["event"] for event in events}, {"trigger", "imprint", "result"})
 
             for path in ("/", "/api/status", "/api/cameras", "/api/sessions", "/api/result/latest", "/healthz"):
                 with urllib.request.urlopen(f"http://127.0.0.1:{line.page}{path}", timeout=10) as answer:
