@@ -180,7 +180,7 @@ class LiveLineTest(unittest.TestCase):
             events = json.loads(everything.communicate(timeout=PATIENCE_S)[0])
             self.assertEqual(everything.returncode, 0)
             self.assertEqual({event["camera"] for event in events if event["event"] == "imprint"}, {"cam1", "cam2", "cam3"})
-            self.assertEqual({event["event"] for event in events}, {"trigger", "imprint", "result"})
+            self.assertEqual({event["event"] for event in events}, {"camera", "trigger", "imprint", "result"})
 
             for path in ("/", "/api/status", "/api/cameras", "/api/sessions", "/api/result/latest", "/healthz"):
                 with urllib.request.urlopen(f"http://127.0.0.1:{line.page}{path}", timeout=10) as answer:
