@@ -18,9 +18,7 @@ Result<LineLink> LineLink::open(const LineOptions& options) {
   auto keys = Keys::of(options.site, options.line);
   if (!keys) return pass_on(keys.error());
   auto transport = open_zenoh({.connect = {options.connect}, .tool = true});
-  if (!transport) {
-    return pass_on({transport.error().kind, transport.error().message + "; is imprint-fusion running?"});
-  }
+  if (!transport) return pass_on(transport.error());
   return LineLink(options, std::move(*keys), std::move(*transport));
 }
 
