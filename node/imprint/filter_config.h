@@ -21,10 +21,10 @@ struct FilterConfig {
   double lone_step_price = 0.8;  // stretch, in diameters, that pays for a step which the other rim does not share; ours
   double min_shared_step_px = 2.5;   // smaller steps of both rims at one place may be chance; ours
   int max_chain_gap = 600;           // longest stretch without trusted rim that a chain bridges; ours
-  int agreement_window = 150;        // over which the middle of the rims is smooth; ours
+  int agreement_window = 240;        // over which the middle of the rims is smooth; ours
   double min_disagreement_px = 0.5;  // of the middle, from which the rim further in is not trusted; ours
 
-  double min_coverage = 0.25;  // share of the length with both rims trusted; ours
+  double min_coverage = 0.15;  // share of the length with both rims trusted; ours
   int min_points = 50;         // of each rim; ours
 
   [[nodiscard]] Result<void> validate() const;

@@ -10,12 +10,14 @@
 namespace imprint {
 namespace {
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
+
+double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
 double median_width(const RimCurve& upper, const RimCurve& lower) {
   std::vector<double> widths;
@@ -26,21 +28,42 @@ double median_width(const RimCurve& upper, const RimCurve& lower) {
   return median(widths);
 }
 
-// What the point's own looks say: a weak edge, one that runs askew to its neighbours or a bad fit counts less.
+// How restless the gradient's direction is about each point, deg: root mean square off the rim's usual direction. A rim
+// against the background is straight over a few px; the border of scale is ragged.
+std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, double usual_deg) {
+  constexpr int kHalf = 7;  // stations
+  std::vector<double> unrest(points.size());
+  std::size_t first = 0, last = 0;
+  double squares = 0;
+  const auto square = [&](std::size_t i) { return std::pow(points[i].direction_deg - usual_deg, 2); };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (; last < points.size() && points[last].station_px <= points[i].station_px + kHalf; ++last)
+      squares += square(last);
+    for (; points[first].station_px < points[i].station_px - kHalf; ++first) squares -= square(first);
+    unrest[i] = std::sqrt(std::max(0.0, squares) / static_cast<double>(last - first));
+  }
+  return unrest;
+}
+
+// What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   RimCurve curve;
+  if (points.empty()) return curve;
   curve.reserve(points.size());
   std::vector<double> magnitudes, directions, sigmas;
   for (const EdgePoint& p : points) {
     magnitudes.push_back(p.magnitude), directions.push_back(p.direction_deg), sigmas.push_back(p.sigma_px);
   }
   const double magnitude = median(magnitudes), direction = median(directions), sigma = std::max(1e-4, median(sigmas));
-  for (const EdgePoint& p : points) {
+  const std::vector<double> unrest = direction_unrest(points, direction);
+  // Of the calmer part of the rim: scale may border more than half of it.
+  const double calm_deg = std::max(1.0, quantile(unrest, 0.3));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const EdgePoint& p = points[i];
     const double by_magnitude = std::min(1.0, p.magnitude / (0.7 * magnitude + 1e-9));
-    const double askew = (p.direction_deg - direction) / 30.0;
+    const double by_direction = std::pow(std::min(1.0, 2.5 * calm_deg / std::max(1e-3, unrest[i])), 2);
     const double excess = std::max(1.0, p.sigma_px / (1.5 * sigma));
-    curve.push_back({static_cast<double>(p.station_px), p.offset_px,
-                     by_magnitude * std::exp(-0.5 * askew * askew) / (excess * excess)});
+    curve.push_back({static_cast<double>(p.station_px), p.offset_px, by_magnitude * by_direction / (excess * excess)});
   }
   return curve;
 }
@@ -51,6 +74,7 @@ RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts
   RimCurve out;
   if (curve.empty()) return out;
   const double half = 0.5 * window;
+  constexpr double kLeastTrust = 0.2;
   const double scale = 4.685 * std::max(noise_px, 0.02);
   double kernel = 0;  // the sum of the weights of a full window
   for (int k = -static_cast<int>(half); k <= static_cast<int>(half); ++k)
@@ -85,7 +109,7 @@ RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts
     for (const CurveSample& s : near) trust += s.weight;
     // A cut takes away one half of the window at most: that is no reason for distrust.
     const double share = fit ? std::clamp(2 * trust / kernel, 0.0, 1.0) : 0.0;
-    out.push_back({station, fit ? fit->c0 : 0.0, share < 0.1 ? 0.0 : share});
+    out.push_back({station, fit ? fit->c0 : 0.0, share < kLeastTrust ? 0.0 : share});
   }
   return out;
 }
@@ -119,7 +143,7 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
   const double noise = std::max(0.05, rim_noise_px(middle));
   RimCurve course = middle;
   std::vector<double> residual(middle.size(), 0.0);
-  for (int pass = 0; pass < 3; ++pass) {
+  for (int pass = 0; pass < 5; ++pass) {
     // A coarse grid will do: the course is smooth by intent.
     constexpr double kEvery = 10;
     const double first = middle.front().station_px, last = middle.back().station_px;
@@ -135,12 +159,13 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
       const double smooth = (1 - t) * grid[g] + t * grid[g + 1];
       residual[i] = std::isnan(smooth) ? 0.0 : middle[i].offset_px - smooth;
     }
-    const double scale = 4.685 * std::max(noise, 0.5 * config.min_disagreement_px);
+    const double scale = 4.685 * std::max(noise, 0.25 * config.min_disagreement_px);
     for (std::size_t i = 0; i < middle.size(); ++i) {
       const double r = residual[i] / scale;
       course[i].weight = middle[i].weight * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
     }
   }
+  constexpr double kEitherPx = 1.5;
   const double limit = std::max(config.min_disagreement_px, 5 * noise);
   const auto distrust = [](RimCurve& rim, double station, double factor) {
     const SampleRange range = samples_near(rim, station, 0.25);
@@ -148,8 +173,12 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
   };
   for (std::size_t i = 0; i < middle.size(); ++i) {
     const double excess = std::abs(residual[i]) / limit;
-    if (excess > 0.5)
-      distrust(residual[i] > 0 ? upper : lower, middle[i].station_px, excess > 1 ? 0.0 : 2 * (1 - excess));
+    if (excess <= 0.5) continue;
+    const double factor = excess > 1 ? 0.0 : 2 * (1 - excess);
+    // Far off it may as well be the other rim, taken for the edge of something behind the forging.
+    const bool either = std::abs(residual[i]) > kEitherPx;
+    if (residual[i] > 0 || either) distrust(upper, middle[i].station_px, factor);
+    if (residual[i] < 0 || either) distrust(lower, middle[i].station_px, factor);
   }
 }
 
