@@ -90,6 +90,8 @@ period_s = 0.5
             process.kill()
         for process in self.processes.values():
             process.wait()
+            if process.stdout:
+                process.stdout.close()
 
     def start(self, name, command):
         with open(self.folder / f"{name}.log", "ab") as log:
@@ -134,8 +136,10 @@ period_s = 0.5
         return json.loads(done.stdout)
 
     def watch(self, *arguments):
-        return subprocess.Popen([IMPRINT, "watch", "--connect", self.endpoint, "--json", *map(str, arguments)],
-                                stdout=subprocess.PIPE)
+        watch = subprocess.Popen([IMPRINT, "watch", "--connect", self.endpoint, "--json", *map(str, arguments)],
+                                 stdout=subprocess.PIPE)
+        self.processes[f"watch {len(self.processes)}"] = watch
+        return watch
 
     def result(self, session="S"):
         with urllib.request.urlopen(f"http://127.0.0.1:{self.page}/api/result/{session}", timeout=10) as answer:
