@@ -8,6 +8,7 @@
 #include "fusion/triangulate/consistency.h"
 #include "fusion/triangulate/end_planes.h"
 #include "fusion/triangulate/section_fit.h"
+#include "fusion/triangulate/stray_tangents.h"
 #include "fusion/triangulate/triangulate_config.h"
 
 namespace imprint {
@@ -230,6 +231,7 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
   observed.end_world_mm = axis.at(ends.planes.last.x_mm).point_mm;
   observed.length_sigma_mm = ends.planes.length_sigma_mm();
   observed.sections = sections_of(axis, tangents, agreeing->views, ends.planes, config);
+  remove_stray_tangents(observed.sections, observed.radius_mm, config.stray_share);
   return observed;
 }
 
