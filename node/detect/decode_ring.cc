@@ -20,7 +20,7 @@ constexpr double cover_density = 0.4;       // of a reading that may be anything
 constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
 constexpr double max_profile =
     0.15;                         // rms of the columns; spots of a texture have no edges where a code has them, ours
-constexpr double max_fit = 0.22;  // rms of the known bits; rings in clutter have levels at random
+constexpr double max_fit = 0.15;  // rms of the known bits; rings in clutter have levels at random
 
 int bit_of(std::uint32_t code, int bits, int index) {
   return static_cast<int>((code >> ((2 * bits - 1 - index) % bits)) & 1U);

@@ -93,7 +93,7 @@ class TargetSearch {
         trace_(trace) {}
 
   std::vector<DetectedTarget> run() {
-    for (int l = 0; l < pyramid_.levels(); ++l) collect_candidates(l);
+    for (int l = first_level(); l < pyramid_.levels(); ++l) collect_candidates(l);
     // The best ellipses first, so that the parts of a target's ring are known when their turn comes.
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.doubt < b.doubt; });
@@ -114,13 +114,27 @@ class TargetSearch {
     double doubt = 0.0;
   };
 
+  /// The finest level that the smallest dot, seen at 72 degrees, needs.
+  [[nodiscard]] int first_level() const {
+    constexpr double foreshortening = 0.3;
+    int l = 0;
+    while (l + 1 < pyramid_.levels() &&
+           2.0 * min_level_semi_minor_px * ImagePyramid::scale(l + 1) <= foreshortening * config_.min_dot_px)
+      ++l;
+    return l;
+  }
+
   /// Ellipses of one level that stand on dark ground and have something like a ring.
   void collect_candidates(int l) {
     const GreyImage& level = pyramid_.level(l);
     // A blurred or shaded ring shows fewer white places than it has: half of the fewest is asked for.
     const double least_white_ring = 0.5 * decoder_.least_white() / library_.bits;
-    for (const cv::Point& blob : find_blobs(level.mat(), config_.min_contrast, config_.max_candidates_per_tile)) {
-      const auto star = find_star_ellipse(level, {blob.x, blob.y}, config_);
+    // What is lost in the noise of a level shows on a coarser one, or not at all.
+    constexpr double least_signal_to_noise = 5.0;
+    DetectConfig of_level = config_;
+    of_level.min_contrast = std::max(config_.min_contrast, least_signal_to_noise * noise_ / ImagePyramid::scale(l));
+    for (const cv::Point& blob : find_blobs(level.mat(), of_level.min_contrast, config_.max_candidates_per_tile)) {
+      const auto star = find_star_ellipse(level, {blob.x, blob.y}, of_level);
       if (!star) continue;
       const Ellipse full =
           star->ellipse.scaled(ImagePyramid::scale(l), ImagePyramid::from_level(star->ellipse.center, l));
@@ -186,6 +200,13 @@ class TargetSearch {
            dot.sigma_px > max_sigma_of_diameter * diameter_of(dot.ellipse);
   }
 
+  /// Whether dot and ring together are farther from a target's than either may be alone.
+  [[nodiscard]] bool is_doubtful(const FittedDot& dot, const DecodedRing& ring) const {
+    constexpr double limit = 0.155;  // share of the contrast
+    const double of_dot = std::sqrt(std::max(0.0, dot.residual * dot.residual - noise_ * noise_)) / dot.contrast;
+    return std::hypot(of_dot, ring.profile) > limit;
+  }
+
   struct DecodedDot {
     Rejection rejection = Rejection::none;
     RingScan scan;
@@ -201,7 +222,8 @@ class TargetSearch {
     if (!scan) return {Rejection::outside, {}, {}};
     const DecodedRing ring = decoder_.decode(*scan);
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scan, ring});
-    const bool accepted = ring.accepted && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits);
+    const bool accepted =
+        ring.accepted && !is_doubtful(dot, ring) && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits);
     return {accepted ? Rejection::none : Rejection::no_code, std::move(*scan), ring};
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace imprint {
@@ -34,34 +35,37 @@ struct EdgePoints {
 };
 
 /// Walks from `start` until the valley behind the first fall has been seen; the distance in px at which the grey level
-/// passes half-way down, or a negative number.
+/// passes half-way down, or a negative number. Steps are half a px, farther out one: a long edge is a blunt one.
 double first_fall_px(const GreyImage& level, const Eigen::Vector2d& start, const Eigen::Vector2d& direction, double top,
                      double min_contrast) {
-  constexpr double step_px = 0.5;
-  constexpr int max_steps = 64;  // an ellipse with the largest minor axis of a level and a ratio of nearly 6
-  std::array<double, max_steps> values{};
+  constexpr int fine_steps = 12;
+  constexpr int max_steps = 40;  // 34 px: an ellipse with the largest minor axis of a level and a ratio of six
+  const auto distance_px = [](int n) { return n <= fine_steps ? 0.5 * n : n - 0.5 * fine_steps; };
+  std::array<double, max_steps> values;  // those before n are set
   double lowest = top;
-  std::size_t half_at = 0;
-  std::size_t n = 0;
+  int half_at = 0;
+  int n = 0;
   for (; n < max_steps; ++n) {
-    const Eigen::Vector2d p = start + (step_px * static_cast<double>(n)) * direction;
+    const Eigen::Vector2d p = start + distance_px(n) * direction;
     if (!level.contains(p)) break;
-    values[n] = level.bilinear(p);
-    lowest = std::min(lowest, values[n]);
+    const double value = level.bilinear(p);
+    values[static_cast<std::size_t>(n)] = value;
+    lowest = std::min(lowest, value);
     const double depth = top - lowest;
     if (depth < min_contrast) continue;
-    while (half_at < n && values[half_at] > top - 0.5 * depth) ++half_at;
+    while (half_at < n && values[static_cast<std::size_t>(half_at)] > top - 0.5 * depth) ++half_at;
     // The valley is as wide as the dot's radius: past it the ring begins.
-    if (values[n] > lowest + 0.4 * depth || (n >= 2 * half_at && n >= half_at + 3)) break;
+    const bool past_valley = n >= half_at + 3 && distance_px(n) >= 2.0 * distance_px(half_at);
+    if (value > lowest + 0.4 * depth || past_valley) break;
   }
   if (top - lowest < min_contrast || half_at == 0) return -1.0;
   const double half = 0.5 * (top + lowest);
-  while (half_at < n && values[half_at] > half) ++half_at;
-  if (half_at >= n && n == max_steps) return -1.0;
-  const double above = values[half_at - 1];
-  const double below = values[half_at];
+  while (half_at < n && values[static_cast<std::size_t>(half_at)] > half) ++half_at;
+  if (half_at >= n) return -1.0;
+  const double above = values[static_cast<std::size_t>(half_at) - 1];
+  const double below = values[static_cast<std::size_t>(half_at)];
   const double share = above > below ? std::clamp((above - half) / (above - below), 0.0, 1.0) : 0.5;
-  return step_px * (static_cast<double>(half_at) - 1.0 + share);
+  return distance_px(half_at - 1) + share * (distance_px(half_at) - distance_px(half_at - 1));
 }
 
 /// First round: nothing is known but a place inside.
@@ -69,18 +73,34 @@ std::optional<Ellipse> rough_ellipse(const GreyImage& level, const Eigen::Vector
   const double top = level.bilinear(start);
   EdgePoints edge;
   double mean = 0.0;
-  for (int i = 0; i < rays; ++i) {
-    const double r = first_fall_px(level, start, directions.unit[static_cast<std::size_t>(i)], top, min_contrast);
+  double smallest = std::numeric_limits<double>::max();
+  constexpr int rough_rays = rays / 2;
+  for (int i = 0; i < rough_rays; ++i) {
+    // Round the clock in steps of 150 degrees: what is no ellipse fails on the first few.
+    const auto ray = static_cast<std::size_t>(2 * (i * 5 % rough_rays));
+    const double r = first_fall_px(level, start, directions.unit[ray], top, min_contrast);
     if (r > 0.0) {
-      edge.add(r * directions.unit[static_cast<std::size_t>(i)]);
+      edge.add(r * directions.unit[ray]);
       mean += r;
-    } else if (i + 1 - static_cast<int>(edge.count) > max_failed_rays) {
+      smallest = std::min(smallest, r);
+    } else if (i + 1 - static_cast<int>(edge.count) > max_failed_rays / 2) {
       return std::nullopt;
     }
+    // Some ray must be as short as the minor axis allows, wherever in the ellipse it starts.
+    if (i + 1 == rough_rays / 2 && smallest > 1.3 * max_level_semi_minor_px) return std::nullopt;
   }
   mean /= static_cast<double>(edge.count);
   for (std::size_t i = 0; i < edge.count; ++i) edge.points[i] /= mean;
-  return fit_ellipse({edge.points.data(), edge.count}, {edge.weights.data(), edge.count}, Ellipse::circle(start, mean));
+  const auto ellipse =
+      fit_ellipse({edge.points.data(), edge.count}, {edge.weights.data(), edge.count}, Ellipse::circle(start, mean));
+  if (!ellipse) return std::nullopt;
+  // Most spots of a texture end here: their outline is nowhere near an ellipse.
+  constexpr double near = 0.3;  // radii
+  std::size_t far_points = 0;
+  for (std::size_t i = 0; i < edge.count; ++i) {
+    if (std::abs(ellipse->radius_of(start + mean * edge.points[i]) - 1.0) > near) ++far_points;
+  }
+  return far_points > edge.count / 4 ? std::nullopt : ellipse;
 }
 
 /// Later rounds: rays in the frame of the ellipse so far, which is the unit circle there.
@@ -215,6 +235,7 @@ std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen
     star.white = framed.white();
     star.black = framed.black();
     ellipse = fit_without_outliers(edge, *ellipse, &star.residual);
+    if (star.residual > 2.0 * config.max_residual) return std::nullopt;
   }
   if (!ellipse || !has_allowed_axes(*ellipse, config) || star.residual > config.max_residual) return std::nullopt;
   star.ellipse = *ellipse;
