@@ -143,6 +143,7 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
   const double noise = std::max(0.05, rim_noise_px(middle));
   RimCurve course = middle;
   std::vector<double> residual(middle.size(), 0.0);
+  std::vector<char> reached(middle.size(), 0);
   for (int pass = 0; pass < 5; ++pass) {
     // A coarse grid will do: the course is smooth by intent.
     constexpr double kEvery = 10;
@@ -157,7 +158,8 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
       const auto g = std::min(static_cast<std::size_t>(at), grid.size() - 2);
       const double t = at - static_cast<double>(g);
       const double smooth = (1 - t) * grid[g] + t * grid[g + 1];
-      residual[i] = std::isnan(smooth) ? 0.0 : middle[i].offset_px - smooth;
+      reached[i] = !std::isnan(smooth);
+      residual[i] = reached[i] ? middle[i].offset_px - smooth : 0.0;
     }
     const double scale = 4.685 * std::max(noise, 0.25 * config.min_disagreement_px);
     for (std::size_t i = 0; i < middle.size(); ++i) {
@@ -165,7 +167,15 @@ void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& c
       course[i].weight = middle[i].weight * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
     }
   }
-  constexpr double kEitherPx = 1.5;
+  // Out of reach of any trusted middle, its parabola over the whole length still tells a rim that is far off.
+  constexpr double kEitherPx = 1.5, kFarOffPx = 5.0;
+  const double centre = 0.5 * (middle.front().station_px + middle.back().station_px);
+  if (const auto whole = fit_parabola(course.data(), course.data() + course.size(), centre, 2)) {
+    for (std::size_t i = 0; i < middle.size(); ++i) {
+      const double off = middle[i].offset_px - whole->at(middle[i].station_px);
+      if (!reached[i] && std::abs(off) > kFarOffPx) residual[i] = off;
+    }
+  }
   const double limit = std::max(config.min_disagreement_px, 5 * noise);
   const auto distrust = [](RimCurve& rim, double station, double factor) {
     const SampleRange range = samples_near(rim, station, 0.25);

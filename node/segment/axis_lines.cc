@@ -189,8 +189,10 @@ std::vector<AxisLine> vote_axis_lines(const RimPairs& pairs, int height_px, doub
     const auto index = static_cast<int>(best - votes.begin());
     const int a = index / bins, b = index % bins;
     lines.push_back({x0, (b + 0.5) * kBinPx - margin, slopes[static_cast<std::size_t>(a)], *best});
-    const int apart = std::max(1, static_cast<int>(separation_px / kBinPx));
-    for (int other = 0; other < angles; ++other)
+    // Another line through the same middle may still be another body's: steeper or flatter by some degrees.
+    const int apart = std::max(1, static_cast<int>(separation_px / kBinPx)),
+              turned = static_cast<int>(1.0 / kAngleStepDeg);
+    for (int other = std::max(0, a - turned); other <= std::min(angles - 1, a + turned); ++other)
       for (int c = std::max(0, b - apart); c <= std::min(bins - 1, b + apart); ++c)
         votes[static_cast<std::size_t>(other) * static_cast<std::size_t>(bins) + static_cast<std::size_t>(c)] = 0.0F;
   }

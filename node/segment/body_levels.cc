@@ -35,14 +35,23 @@ std::vector<float> smoothed(const std::vector<float>& values, int half) {
 // The last column of the body when walking from `from` in steps of `step`.
 int walk(const BodyLevels& levels, int from, int step, float least_body, double max_gap_px) {
   constexpr float kStaysAbove = 0.6F, kMemory = 0.05F;  // of about 20 columns
+  constexpr double kReturnShare = 0.6;
   const int n = static_cast<int>(levels.body.size());
   float brightness = levels.body[static_cast<std::size_t>(from)];
-  int last = from;
-  for (int x = from; x >= 0 && x < n && std::abs(x - last) <= max_gap_px; x += step) {
+  int last = from, run = 0;
+  for (int x = from; x >= 0 && x < n && std::abs(x - last) <= max_gap_px + run; x += step) {
     const float body = levels.body[static_cast<std::size_t>(x)], ground = levels.ground[static_cast<std::size_t>(x)];
-    if (body < least_body || body - ground < kStaysAbove * (brightness - ground)) continue;
+    if (body < least_body || body - ground < kStaysAbove * (brightness - ground)) {
+      run = 0;
+      continue;
+    }
+    ++run;
+    // Behind a gap the body goes on for about as long as the gap was; a lamp does not.
+    const int gap = std::abs(x - last) - run;
+    if (run < kReturnShare * gap) continue;
     brightness += kMemory * (body - brightness);
     last = x;
+    run = 0;
   }
   return last;
 }

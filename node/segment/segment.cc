@@ -5,150 +5,13 @@
 #include <limits>
 
 #include "node/segment/axis_lines.h"
-#include "node/segment/body_levels.h"
-#include "node/segment/body_path.h"
+#include "node/segment/body_search.h"
 #include "node/segment/rim_candidates.h"
 #include "node/segment/segment_config.h"
 #include "node/segment/working_image.h"
 
 namespace imprint {
 namespace {
-
-// The straight line through the middles, robust against the few columns that took a wrong rim.
-AxisLine fit_axis(const BodyPath& path) {
-  AxisLine line;
-  line.x0_px = 0.5 * (path.columns.front().x_px + path.columns.back().x_px);
-  double scale = 1e9;
-  for (int pass = 0; pass < 3; ++pass) {
-    double sw = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-    for (const auto& c : path.columns) {
-      const double x = c.x_px - line.x0_px, y = c.pair.middle_px();
-      const double r = (y - line.y0_px - line.slope * x) / scale;
-      const double w = c.pair.weight / (1 + r * r);
-      sw += w, sx += w * x, sy += w * y, sxx += w * x * x, sxy += w * x * y;
-    }
-    const double det = sw * sxx - sx * sx;
-    line.slope = det > 1e-9 ? (sw * sxy - sx * sy) / det : 0.0;
-    line.y0_px = (sy - line.slope * sx) / sw;
-    scale = 2.0;
-  }
-  return line;
-}
-
-// How well a body fits what is looked for, 0 to 1: seen and bright along its length, elongated, of a likely width, and
-// near where the cameras of a rig are pointed.
-double rate_body(const BodyPath& path, const WorkingImage& working, const SegmentPrior& prior,
-                 const SegmentConfig& config) {
-  if (path.empty()) return 0.0;
-  const double width = path.median_width_px(), elongation = path.length_px() / std::max(1.0, width);
-  const double by_length = std::min(1.0, elongation / config.full_elongation);
-
-  const double width_px = width * working.reduction;
-  const double low = prior.likely_min_px > 0 ? prior.likely_min_px : prior.diameter_min_px;
-  const double high = prior.likely_max_px > 0 ? prior.likely_max_px : prior.diameter_max_px;
-  const double off_range = std::max({1.0, low / width_px, width_px / high});
-  const double by_width = 1.0 / (off_range * off_range);
-
-  const cv::Size size = working.intensity.size();
-  double nearest = 1e18;
-  for (const auto& c : path.columns)
-    nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
-  const double z = nearest / (config.center_reach * working.shorter_side_px);
-  return path.mean_weight() * by_length * by_width / (1 + z * z);
-}
-
-// The level that a section must have to belong to the body: a beam that happens to go on where the forging ends is
-// darker. The bright end of what was followed speaks for the body, since the beam may be longer.
-float least_body_level(const BodyPath& path, const WorkingImage& working, const SegmentConfig& config) {
-  std::vector<float> levels, background;
-  for (const auto& c : path.columns) levels.push_back(c.pair.body);
-  for (int y = 0; y < working.intensity.rows; y += 7)
-    for (int x = 0; x < working.intensity.cols; x += 7)
-      if (working.valid(y, x)) background.push_back(working.intensity(y, x));
-  const auto quantile = [](std::vector<float>& v, double share) {
-    const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
-    std::nth_element(v.begin(), at, v.end());
-    return *at;
-  };
-  if (levels.empty() || background.empty()) return 0.0F;
-  const float dark = quantile(background, 0.5), usual = quantile(levels, 0.8);
-  return dark + static_cast<float>(config.min_body_level) * (usual - dark);
-}
-
-// The body that fits best: the lines with the most votes are followed on their full pairs; the best of these again
-// about their own axis, where one rim alone will do.
-BodyPath find_body(const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
-                   const SegmentPrior& prior, double max_offset_px, const SegmentConfig& config) {
-  constexpr std::size_t kFollowedTwice = 3;
-  struct Rated {
-    BodyPath path;
-    double rating;
-  };
-  std::vector<Rated> bodies;
-  const double separation_px = 0.3 * pairs.min_width_px;
-  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, separation_px, config)) {
-    BodyPath path = follow_body(pairs, working, line, max_offset_px, config.max_gap_diameters);
-    const double rating = rate_body(path, working, prior, config);
-    if (!path.empty()) bodies.push_back({std::move(path), rating});
-  }
-  const auto better = [](const Rated& a, const Rated& b) { return a.rating > b.rating; };
-  std::sort(bodies.begin(), bodies.end(), better);
-  bodies.resize(std::min(bodies.size(), kFollowedTwice));
-  for (Rated& body : bodies) {
-    const AxisLine axis = fit_axis(body.path);
-    const RimPairs near = pairs_about_axis(pairs, working, rims, axis, max_offset_px,
-                                           least_body_level(body.path, working, config), config.max_rims_per_column);
-    body.path = follow_body(near, working, axis, max_offset_px, config.max_gap_diameters);
-    body.rating = rate_body(body.path, working, prior, config);
-  }
-  const auto best = std::min_element(bodies.begin(), bodies.end(), better);
-  return best == bodies.end() ? BodyPath{} : best->path;
-}
-
-// Columns without a pair, in long gaps and towards the ends, get the rough rims.
-void fill_gaps(BodyPath& path, const std::vector<RimPair>& rough, int first_x_px) {
-  constexpr int kBridged = 8;  // columns over which a straight line serves
-  std::vector<BodyPath::Column> filled;
-  int before = first_x_px - kBridged - 1;
-  const auto fill_to = [&](int next) {
-    if (next - before <= kBridged) return;
-    for (int x = before + 1; x < next; ++x) {
-      const int k = x - first_x_px;
-      if (k >= 0 && k < static_cast<int>(rough.size())) filled.push_back({x, rough[static_cast<std::size_t>(k)]});
-    }
-  };
-  for (const auto& column : path.columns) {
-    fill_to(column.x_px);
-    filled.push_back(column);
-    before = column.x_px;
-  }
-  fill_to(first_x_px + static_cast<int>(rough.size()) + kBridged);
-  path.columns = std::move(filled);
-}
-
-// The body once more, now that its brightness is known: beams that pass behind it drop out, and it is followed to
-// where its brightness ends rather than to where both rims are last seen.
-BodyPath refine_body(const BodyPath& found, const RimPairs& pairs, const RimCandidates& rims,
-                     const WorkingImage& working, double max_offset_px, const SegmentConfig& config) {
-  const AxisLine line = fit_axis(found);
-  const double width = found.median_width_px();
-  const float least_body = least_body_level(found, working, config);
-  // From a column that surely belongs to the body, as near to its middle as there is one.
-  int inside = found.columns.front().x_px, nearest = working.intensity.cols;
-  const int middle = found.columns[found.columns.size() / 2].x_px;
-  for (const auto& c : found.columns)
-    if (c.pair.both && c.pair.body >= least_body && std::abs(c.x_px - middle) < nearest)
-      nearest = std::abs(c.x_px - middle), inside = c.x_px;
-  const BodyLevels levels = measure_levels(working, line, width, inside, least_body, config.max_gap_diameters * width);
-  const RimPairs near =
-      pairs_about_axis(pairs, working, rims, line, max_offset_px, least_body, config.max_rims_per_column);
-  BodyPath refined =
-      follow_body(weigh_by_levels(near, working, levels), working, line, max_offset_px, 2.0 * config.max_gap_diameters);
-  if (refined.length_px() < 0.5 * found.length_px()) return found;
-  const std::vector<RimPair> rough = rims_by_brightness(working, line, levels, width);
-  fill_gaps(refined, rough, levels.first_x_px);
-  return refined;
-}
 
 struct RimSample {
   double station_px, upper_px, lower_px;
@@ -176,8 +39,9 @@ void resample_rims(const std::vector<RimSample>& samples, double max_gap_px, Seg
   }
 }
 
-Segmentation describe(const BodyPath& path, const WorkingImage& working, const SegmentConfig& config) {
-  const AxisLine line = fit_axis(path);
+Segmentation describe(const BodyPath& path, const AxisLine& axis, const WorkingImage& working,
+                      const SegmentConfig& config) {
+  const AxisLine line = fit_axis(path, axis);
   const ObservedPoint from = working.observed(path.columns.front().x_px, line.y_px(path.columns.front().x_px));
   const ObservedPoint to = working.observed(path.columns.back().x_px, line.y_px(path.columns.back().x_px));
   const double length = std::hypot(to.x_px - from.x_px, to.y_px - from.y_px);
@@ -255,21 +119,20 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
         "no forging: edges were found, but no two of them {:.0f} to {:.0f} px apart with a {} body between",
         prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
 
-  const double max_offset = config.max_axis_bow * prior.diameter_min_px / r + 3.0;
-  const BodyPath best = find_body(pairs, rims, working, prior, max_offset, config);
-  if (const double width = best.median_width_px(); best.length_px() < config.min_elongation * width || best.empty())
+  const FoundBody body = find_body(pairs, rims, working, prior, config);
+  if (const double width = body.seen.median_width_px();
+      body.seen.empty() || body.seen.length_px() < config.min_elongation * width)
     return job_failed(
         "no forging: the best body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is "
         "needed",
-        best.length_px() * r, width * r, config.min_elongation);
-  const BodyPath refined = refine_body(best, pairs, rims, working, max_offset, config);
-  Segmentation found = describe(refined, working, config);
+        body.seen.length_px() * r, width * r, config.min_elongation);
+  Segmentation found = describe(body.whole, body.axis, working, config);
   const auto with_both =
-      std::count_if(best.columns.begin(), best.columns.end(), [](const auto& c) { return c.pair.both; });
-  found.score = std::min(1.0, static_cast<double>(with_both) / refined.length_px());
+      std::count_if(body.seen.columns.begin(), body.seen.columns.end(), [](const auto& c) { return c.pair.both; });
+  found.score = std::min(1.0, static_cast<double>(with_both) / body.whole.length_px());
   if (found.score < config.min_score)
     return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",
-                      100 * found.score, refined.length_px() * r, 100 * config.min_score);
+                      100 * found.score, body.whole.length_px() * r, 100 * config.min_score);
   return found;
 }
 

@@ -16,7 +16,7 @@ struct SegmentConfig {
   int min_rim_run_px = 9;                 // length of the opening along the axis, reduced; ours
   double max_tilt_deg = 10.0;             // forging against the prior direction; ours
   int max_rims_per_column = 12;           // of each kind, the strongest; ours
-  int axis_candidates = 12;               // Hough lines looked into; ours
+  int axis_candidates = 24;               // Hough lines looked into; ours
   double max_axis_bow = 0.25;             // axis from a straight line, share of the smallest diameter; ours
   double min_elongation = 2.0;            // seen length over diameter that makes a forging; ours
   double full_elongation = 5.0;           // beyond this, length is no further evidence: beams are long too; ours
