@@ -62,11 +62,11 @@ struct Plant {
     }
     declarations.push_back(*outside->subscribe(keys.result(), {}, [this](const Sample& sample) {
       const std::lock_guard lock(mutex);
-      results.push_back(*decode_result(sample.payload));
+      if (const auto result = decode_result(sample.payload)) results.push_back(*result);
     }));
     declarations.push_back(*outside->subscribe(keys.trigger(), {}, [this](const Sample& sample) {
       const std::lock_guard lock(mutex);
-      seen_triggers.push_back(*decode_trigger(sample.payload));
+      if (const auto trigger = decode_trigger(sample.payload)) seen_triggers.push_back(*trigger);
     }));
     start();
   }
