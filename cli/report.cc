@@ -41,7 +41,11 @@ int run_report(const ReportOptions& options, bool as_json) {
     }
     return print_json(document);
   }
-  std::cout << result_table(*measurement, truth ? &*truth : nullptr);
+  const std::string table = result_table(*measurement, truth ? &*truth : nullptr);
+  if (!options.out.empty()) {
+    if (auto written = write_file_atomically(options.out, table); !written) return fail(written.error());
+  }
+  std::cout << table;
   return 0;
 }
 
@@ -50,9 +54,10 @@ int run_report(const ReportOptions& options, bool as_json) {
 void add_report_command(Cli& cli) {
   auto options = std::make_shared<ReportOptions>();
   auto* command =
-      cli.command(cli.app, "report", "a measured result for a person: as a table, beside the truth, as a page",
+      cli.command(cli.app, "report", "a measured result for a person: as a table, beside the truth if it is known",
                   [options, &cli] { return run_report(*options, cli.json); });
   command->add_option("result", options->result, "result.json")->required();
+  command->add_option("--out", options->out, "write the table here too");
   command->add_option("--truth", options->truth, "truth.json of a simulated forging: print the errors too");
 }
 

@@ -55,7 +55,7 @@ class Plant:
     def __enter__(self):
         self.start("fusion", "imprint-fusion", ROOT / "deploy" / "fusion.toml", fusion__rig=f'"{self.rig}"',
                    fusion__database=f'"{self.folder / "fusion.sqlite"}"', fusion__result_dir=f'"{self.folder / "results"}"',
-                   zenoh__listen=f'["{self.endpoint}"]', page__port=self.page.rsplit(":", 1)[1].strip("/"))
+                   zenoh__listen=f'["{self.endpoint}"]', fusion__deadline_s=60.0, page__port=self.page.rsplit(":", 1)[1].strip("/"))
         for camera in self.cameras:
             self.start(camera, "imprint-node", ROOT / "firmware_config" / "node.toml", node__camera_id=f'"{camera}"',
                        node__rig=f'"{self.rig}"', capture__source='"session"', capture__path=f'"{self.folder / "session.toml"}"',
@@ -133,7 +133,7 @@ def main():
         result = plant.measure(name, rotations)
         result_file = source / "result.json"
         result_file.write_text(json.dumps(json.loads(result), indent=1) + "\n", encoding="utf-8")
-        report_file = source / "report.html"
+        report_file = source / "report.txt"
         arguments = ["report", result_file, "--out", report_file]
         if (source / "truth.json").is_file():
             arguments += ["--truth", source / "truth.json"]
