@@ -231,7 +231,8 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
               [](const auto& a, const auto& b) { return a.first.misfit_mm < b.first.misfit_mm; });
     const Agreement& agreed = trials.front().first;
     const double next = trials.size() > 1 ? trials[1].first.misfit_mm : std::numeric_limits<double>::infinity();
-    if (best && !(agreed.misfit_mm < limit && agreed.misfit_mm < 0.5 * next)) {
+    // The others must agree well, and better than any other set by more than the noise of edges and ends.
+    if (best && !(agreed.misfit_mm < limit && agreed.misfit_mm < 0.5 * next && next > 0.25 * limit)) {
       result.disagreement_mm = best->contradiction_mm;
       break;
     }
