@@ -36,12 +36,13 @@ int remove_stray_tangents(std::vector<ObservedSection>& sections, double radius_
     const int here = static_cast<int>(i);
     const auto before = median_distance_mm(sections, here - kNeighbours, here + 1);
     const auto after = median_distance_mm(sections, here - 1, here + kNeighbours);
-    const auto like = [&](const std::optional<double>& usual, double distance) {
-      return usual && std::abs(distance - *usual) < tolerance_mm;
-    };
+    // Between the two sides counts as like them: a shoulder has every radius from one to the other.
+    const auto usual = before ? before : after;
+    const double least = usual ? std::min(*usual, after.value_or(*usual)) : 0.0;
+    const double most = usual ? std::max(*usual, after.value_or(*usual)) : 0.0;
     for (const TangentPlane& tangent : sections[i].tangents) {
       const double distance = distance_mm(sections[i], tangent);
-      const bool stays = (!before && !after) || like(before, distance) || like(after, distance);
+      const bool stays = !usual || (distance > least - tolerance_mm && distance < most + tolerance_mm);
       if (stays) kept[i].push_back(tangent);
       removed += stays ? 0 : 1;
     }
