@@ -2,6 +2,7 @@
 
 #include <string_view>
 
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "lib/config/atomic_file.h"
@@ -13,6 +14,8 @@ namespace {
 /// OpenCV's decoders report by exception, by an empty picture, or on stderr: here all become an empty picture.
 cv::Mat decode(std::string_view bytes) {
   const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+  // Of unknown TIFF tags and the like; what matters comes back as our own one-line error.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   try {
     return cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
   } catch (const std::exception&) {  // cv::Exception, or bad_alloc for a picture larger than memory

@@ -44,34 +44,41 @@ bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
   return true;
 }
 
-/// Ellipses already looked at: one dot is found from several maxima, on two levels.
+/// Ellipses already looked at: one dot is found from several maxima, on two levels. On a finer level it gets another
+/// look, since the coarser one may have had too few pixels.
 class ExaminedPlaces {
  public:
-  [[nodiscard]] bool has_like(const Ellipse& ellipse) const {
+  [[nodiscard]] bool has_like(const Ellipse& ellipse, int level) const {
     const double diameter = diameter_of(ellipse);
     const auto [x, y] = cell_of(ellipse.center);
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto cell = cells_.find({x + dx, y + dy});
         if (cell == cells_.end()) continue;
-        for (const Ellipse& known : cell->second) {
+        for (const Place& known : cell->second) {
           constexpr double near = 0.2;      // radii
           constexpr double similar = 0.15;  // share of the diameter
-          if (known.radius_of(ellipse.center) < near && std::abs(diameter_of(known) - diameter) < similar * diameter)
+          if (known.level <= level && known.ellipse.radius_of(ellipse.center) < near &&
+              std::abs(diameter_of(known.ellipse) - diameter) < similar * diameter) {
             return true;
+          }
         }
       }
     }
     return false;
   }
-  void add(const Ellipse& ellipse) { cells_[cell_of(ellipse.center)].push_back(ellipse); }
+  void add(const Ellipse& ellipse, int level) { cells_[cell_of(ellipse.center)].push_back({ellipse, level}); }
 
  private:
+  struct Place {
+    Ellipse ellipse;
+    int level;
+  };
   static std::pair<int, int> cell_of(const Eigen::Vector2d& p) {
     constexpr double cell_px = 32.0;
     return {static_cast<int>(std::floor(p.x() / cell_px)), static_cast<int>(std::floor(p.y() / cell_px))};
   }
-  std::map<std::pair<int, int>, std::vector<Ellipse>> cells_;
+  std::map<std::pair<int, int>, std::vector<Place>> cells_;
 };
 
 /// A target with what decides between two that claim the same id or place.
@@ -98,8 +105,8 @@ class TargetSearch {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.doubt < b.doubt; });
     for (const Candidate& candidate : candidates_) {
-      if (is_known(candidate.full) || examined_.has_like(candidate.full)) continue;
-      examined_.add(candidate.full);
+      if (is_known(candidate.full) || examined_.has_like(candidate.full, candidate.level)) continue;
+      examined_.add(candidate.full, candidate.level);
       const Rejection rejection = examine(candidate.level, candidate.star);
       if (rejection != Rejection::none) reject(candidate.full, rejection);
     }
@@ -163,24 +170,29 @@ class TargetSearch {
     const auto rough = fit_dot(level, {star.ellipse, star.black, star.white - star.black});
     if (!rough || rough->contrast < config_.min_contrast) return Rejection::poor_ellipse;
     if (is_poor(*rough, noise_ / ImagePyramid::scale(l))) return Rejection::poor_ellipse;
-    const FittedDot guess = at_full_resolution(*rough, l);
-    const DecodedDot first = decode(guess);
-    if (first.rejection != Rejection::none) return first.rejection;
-    // Now that the code is known, its light can be taken off: in small dots it reaches the window.
-    const auto ring_light = [&](const Eigen::Vector2d& place) {
-      return ring_light_at(place, guess, first.scan, first.ring.code, library_.geometry);
-    };
-    const auto fine =
-        fit_dot(pyramid_.level(0), {guess.ellipse, guess.black, guess.contrast, guess.blur_px}, ring_light);
-    if (!fine || is_poor(*fine, noise_)) return Rejection::poor_ellipse;
-    const DecodedDot second = decode(*fine);
-    if (second.rejection != Rejection::none) return second.rejection;
-    const DetectedTarget target{second.ring.id,
-                                {fine->ellipse.center.x(), fine->ellipse.center.y()},
-                                fine->sigma_px,
-                                diameter_of(fine->ellipse),
-                                second.ring.distance};
-    found_.push_back({target, fine->ellipse, second.ring.margin, second.ring.fit});
+    FittedDot dot = at_full_resolution(*rough, l);
+    DecodedDot decoded = decode(dot);
+    if (decoded.rejection != Rejection::none) return decoded.rejection;
+    // Now that the code is known, the ring's light can be taken off; in small dots it reaches the window, and the first
+    // fit, which it disturbed, has to be mended twice.
+    constexpr double small_px = 10.0;
+    const int rounds = diameter_of(dot.ellipse) < small_px ? 3 : 1;
+    for (int round = 0; round < rounds; ++round) {
+      const auto ring_light = [&](const Eigen::Vector2d& place) {
+        return ring_light_at(place, dot, decoded.scan, decoded.ring.code, library_.geometry);
+      };
+      const auto fine = fit_dot(pyramid_.level(0), {dot.ellipse, dot.black, dot.contrast, dot.blur_px}, ring_light);
+      if (!fine || is_poor(*fine, noise_)) return Rejection::poor_ellipse;
+      dot = *fine;
+      decoded = decode(dot);
+      if (decoded.rejection != Rejection::none) return decoded.rejection;
+    }
+    const DetectedTarget target{decoded.ring.id,
+                                {dot.ellipse.center.x(), dot.ellipse.center.y()},
+                                dot.sigma_px,
+                                diameter_of(dot.ellipse),
+                                decoded.ring.distance};
+    found_.push_back({target, dot.ellipse, decoded.ring.margin, decoded.ring.fit});
     return Rejection::none;
   }
 

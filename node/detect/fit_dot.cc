@@ -61,14 +61,19 @@ class DotModel {
     const double radius = std::max(in_frame.norm(), 1e-6);
     const Eigen::Vector2d radius_gradient = dot_.shape * q / radius;
     const double slope = std::max(radius_gradient.norm(), 1e-9);
-    const double z = -(radius - 1.0) / (slope * dot_.blur);  // first order in the distance to the ellipse
-    constexpr double far = 4.5;                              // blurs from the edge: flat to 3e-6 of the contrast
+    // First order in the distance to the ellipse, and in the curvature: blur draws a round edge inwards.
+    const Eigen::Vector2d normal = radius_gradient / slope;
+    const Eigen::Vector2d tangent(-normal.y(), normal.x());
+    const double curvature = tangent.dot(dot_.shape * tangent) / slope;
+    const double spread = dot_.blur * std::sqrt(1.0 + 0.5 * curvature * curvature * dot_.blur * dot_.blur);
+    const double z = -((radius - 1.0) / slope + 0.5 * curvature * dot_.blur * dot_.blur) / spread;
+    constexpr double far = 4.5;  // blurs from the edge: flat to 3e-6 of the contrast
     const double cover = z > far ? 1.0 : z < -far ? 0.0 : 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0);
     const double shade = 1.0 + dot_.shading.dot(q);
     if (gradient != nullptr) {
       const double density = std::abs(z) > far ? 0.0 : std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
       const double by_z = dot_.contrast * shade * density;
-      const double by_radius = -by_z / (slope * dot_.blur);
+      const double by_radius = -by_z / (slope * spread);
       Vector& g = *gradient;
       g.segment<2>(0) = -by_radius * radius_gradient - dot_.contrast * cover * dot_.shading;
       g[2] = by_radius * 0.5 * in_frame.x() * in_frame.x() / radius;
@@ -91,7 +96,7 @@ class DotModel {
 /// with the weight of those left out.
 std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
   const double semi_minor = axes_of(guess).semi_minor_px;
-  const double window_radii = std::clamp(1.0 + 1.5 / semi_minor, min_window_radii, max_window_radii);
+  const double window_radii = std::clamp(1.0 + 2.0 / semi_minor, min_window_radii, max_window_radii);
   const Eigen::Matrix2d covariance = guess.shape.inverse();
   const double half_width = window_radii * std::sqrt(covariance(0, 0));
   const double half_height = window_radii * std::sqrt(covariance(1, 1));
@@ -109,7 +114,10 @@ std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
       if (radius > window_radii) continue;
       const bool near_edge = std::abs(radius - 1.0) < edge_band;
       if (!near_edge && (x % stride != 0 || y % stride != 0)) continue;
-      samples.push_back({p - guess.center, image.pixel(x, y), near_edge ? 1.0 : static_cast<double>(stride * stride)});
+      // The window fades out over a px: a sharp border would move in steps with the pixel grid.
+      const double fade = std::clamp((window_radii - radius) * semi_minor, 0.0, 1.0);
+      const double weight = near_edge ? 1.0 : static_cast<double>(stride * stride);
+      samples.push_back({p - guess.center, image.pixel(x, y), weight * fade});
     }
   }
   return samples;
@@ -136,6 +144,12 @@ NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& 
     equations.cost += sample.weight * residual * residual / (1.0 + ratio);
     equations.weight += weight;
   }
+  // In a dot of few px a shading looks like a shift of the centre: there it is held at zero.
+  const double small_radii = 5.0 / axes_of({Eigen::Vector2d::Zero(), dot.shape}).semi_minor_px;
+  const double hold = 4.0 * dot.contrast * dot.contrast * std::pow(small_radii, 6.0);
+  equations.matrix.diagonal().tail<2>().array() += hold;
+  equations.right.tail<2>() -= hold * dot.shading;
+  equations.cost += hold * dot.shading.squaredNorm();
   return equations;
 }
 

@@ -1,7 +1,7 @@
 #include "node/detect/detect_targets.h"
 
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 
 #include <catch2/catch.hpp>
 
@@ -41,11 +41,8 @@ std::vector<DetectedTarget> detect(const cv::Mat& image) { return detect_targets
 
 }  // namespace
 
-TEST_CASE("detect: a centre has no bias beyond 0.01 px at any phase of the pixel grid, 0.05 px for dots of 6 px") {
+TEST_CASE("detect: a centre has no bias beyond 0.01 px at any phase of the pixel grid") {
   for (const double radius : {3.0, 8.0, 20.0}) {
-    // Of a dot of 6 px, seen aslant and blurred, the ring's light reaches the rim of the dot.
-    const double limit_px = radius < 4.0 ? 0.05 : 0.01;
-    const double size_share = radius < 4.0 ? 0.06 : 0.03;
     for (const double phase : {0.0, 0.21, 0.5, 0.77}) {
       cv::Mat canvas = ground(160, 160);
       const Eigen::Vector2d center(80.0 + phase, 79.0 + 0.6 * phase);
@@ -54,10 +51,10 @@ TEST_CASE("detect: a centre has no bias beyond 0.01 px at any phase of the pixel
       INFO("radius " << radius << " px, phase " << phase);
       REQUIRE(found.size() == 1);
       CHECK(found[0].id == 3);
-      CHECK(std::abs(found[0].center.x_px - center.x()) < limit_px);
-      CHECK(std::abs(found[0].center.y_px - center.y()) < limit_px);
+      CHECK(std::abs(found[0].center.x_px - center.x()) < 0.01);
+      CHECK(std::abs(found[0].center.y_px - center.y()) < 0.01);
       // Mean of the axes: 2 r (1 + cos 30 deg) / 2; small dots share size with blur.
-      CHECK(found[0].dot_diameter_px == Approx(radius * (1.0 + std::cos(std::numbers::pi / 6.0))).epsilon(size_share));
+      CHECK(found[0].dot_diameter_px == Approx(radius * (1.0 + std::cos(std::numbers::pi / 6.0))).epsilon(0.05));
     }
   }
 }
@@ -74,15 +71,19 @@ TEST_CASE("detect: every code is read at every turn, clockwise only") {
     CHECK(target.center.x_px == Approx(90.0 * id).margin(0.1));  // noise 2 of contrast 120: sigma about 0.006 px
     CHECK(target.distance == 0.0);
   }
+  // In the mirror only rings that are their own mirror image are still read.
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);
-  for (const DetectedTarget& target : detect(mirrored)) {
-    // Only a ring that is its own mirror image, or one wrong bit from another code, may be read in the mirror.
+  const auto in_mirror = detect(mirrored);
+  for (int id = 1; id <= 12; ++id) {
     std::uint32_t reversed = 0;
-    const int shown = static_cast<int>(std::lround((1199.0 - target.center.x_px) / 90.0));
-    for (int bit = 0; bit < 15; ++bit) reversed |= ((code_of(shown) >> bit) & 1U) << (14 - bit);
-    CHECK(cyclic_distance(reversed, code_of(target.id), 15) <= 1);
+    for (int bit = 0; bit < 15; ++bit) reversed |= ((code_of(id) >> bit) & 1U) << (14 - bit);
+    const bool symmetric = cyclic_distance(reversed, code_of(id), 15) == 0;
+    const bool read =
+        std::any_of(in_mirror.begin(), in_mirror.end(), [id](const DetectedTarget& t) { return t.id == id; });
+    CHECK(read == symmetric);
   }
+  CHECK(in_mirror.size() < 6);
 }
 
 TEST_CASE("detect: tilts to 70 degrees are read") {
@@ -193,11 +194,12 @@ TEST_CASE("detect: the stated sigma is the spread of the centre") {
 }
 
 TEST_CASE("detect: hostile images give nothing, in bounded time") {
-  using Clock = std::chrono::steady_clock;
+  // Processor time, so that a busy machine does not matter.
   const auto seconds_for = [](const cv::Mat& image) {
-    const auto begin = Clock::now();
+    const std::clock_t begin = std::clock();
+    INFO(image.cols << " x " << image.rows);
     CHECK(detect(image).empty());
-    return std::chrono::duration<double>(Clock::now() - begin).count();
+    return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   };
   seconds_for(cv::Mat(1, 1, CV_8U, cv::Scalar(200)));
   seconds_for(cv::Mat(3, 20000, CV_8U, cv::Scalar(10)));
@@ -215,5 +217,5 @@ TEST_CASE("detect: hostile images give nothing, in bounded time") {
   for (int i = 0; i < 60000; ++i) {
     cv::circle(blobs, {static_cast<int>(random() % 2000), static_cast<int>(random() % 2000)}, 2, cv::Scalar(200), -1);
   }
-  CHECK(seconds_for(blobs) < 20.0);  // about 1 s alone on a core; sanitizers and a busy machine take ten times that
+  CHECK(seconds_for(blobs) < 20.0);  // about 1 s on a core; sanitizers take ten times that
 }
