@@ -117,7 +117,7 @@ bool fit_light(RingScan& scan, std::uint32_t code, int bits) {
   if (white < 2) return false;
   const Eigen::Vector3d fitted = normal.ldlt().solve(right);
   // The paint of dot and ring is one: where the ring as a whole were darker, it would be another thing's.
-  constexpr double most_level = 0.5;  // logarithm
+  constexpr double most_level = 0.7;  // logarithm
   if (std::abs(fitted[0]) > most_level) return false;
   set_light(scan, fitted.tail<2>(), std::exp(fitted[0]));
   return true;
@@ -155,7 +155,9 @@ DecodedRing RingDecoder::decode(RingScan& scan) const {
     RingScan relit = scan;
     if (!fit_light(relit, ring.code, bits_)) break;
     const DecodedRing next = decode_once(relit);
-    if (next.wrong > 0 || !(next.profile < ring.profile)) break;  // a light of one's own choice explains enough
+    const bool better = next.unknown < ring.unknown || (next.unknown == ring.unknown && next.profile < ring.profile);
+    if (next.wrong > 0 || !better || (ring.accepted && !next.accepted))
+      break;  // a light of one's own choice explains enough
     ring = next;
     scan = std::move(relit);
   }
