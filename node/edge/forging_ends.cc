@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "node/edge/body_brightness.h"
 #include "node/edge/edge_path.h"
 #include "node/edge/scan_lines.h"
 #include "node/edge/step_edges.h"
@@ -15,23 +16,15 @@
 namespace imprint {
 namespace {
 
-double grey_at(const cv::Mat& image, const ObservedPoint& p, bool invert) {
-  const int x = static_cast<int>(std::lround(p.x_px)), y = static_cast<int>(std::lround(p.y_px));
-  if (x < 0 || y < 0 || x >= image.cols || y >= image.rows) return -1.0;
-  const double value =
-      image.depth() == CV_16U ? image.at<unsigned short>(y, x) / 65535.0 : image.at<unsigned char>(y, x) / 255.0;
-  return invert ? 1.0 - value : value;
-}
-
 // Upper quartile over a broad band about the axis at one station, so that scale on a part of it does not hide the body;
 // negative when the axis has left the image.
 double band_level(const cv::Mat& image, const SilhouetteFrame& frame, double station, const EndSearch& search,
-                  bool invert) {
-  if (grey_at(image, frame.at(station, search.axis_offset_px), invert) < 0) return -1.0;
+                  Polarity polarity) {
+  if (grey_at(image, frame.at(station, search.axis_offset_px), polarity) < 0) return -1.0;
   std::vector<double> values;
   for (int k = -10; k <= 10; ++k) {
     const double value =
-        grey_at(image, frame.at(station, search.axis_offset_px + 0.035 * k * search.diameter_px), invert);
+        grey_at(image, frame.at(station, search.axis_offset_px + 0.035 * k * search.diameter_px), polarity);
     if (value >= 0) values.push_back(value);
   }
   const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(3 * values.size() / 4);
@@ -53,6 +46,7 @@ struct ArcFit {
   Eigen::Vector3d coefficients = Eigen::Vector3d::Zero();
   double apex_variance = 0.0;  ///< for points with a variance of 1
   double rms = 0.0;
+  double shared_variance = 0.0;  ///< covariance of residuals some rows apart: what haze moves together
   int count = 0;
 };
 
@@ -73,12 +67,17 @@ std::optional<ArcFit> refit_arc(const std::vector<ArcPoint>& points, const Eigen
   if (fit.count < 6 || solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 1e-7)) return std::nullopt;
   fit.coefficients = solver.solve(right);
   fit.apex_variance = solver.solve(Eigen::Vector3d::UnitX())[0];
-  double squares = 0;
-  for (const ArcPoint& p : points)
-    if (const double r = p.station_px - arc_terms(p.across).dot(fit.coefficients);
-        std::abs(p.station_px - arc_terms(p.across).dot(from)) <= reach)
-      squares += r * r;
+  constexpr std::size_t kApart = 4;  // beyond what blur and noise share
+  std::vector<double> residuals;
+  double squares = 0, products = 0;
+  for (const ArcPoint& p : points) {
+    if (std::abs(p.station_px - arc_terms(p.across).dot(from)) > reach) continue;
+    residuals.push_back(p.station_px - arc_terms(p.across).dot(fit.coefficients));
+    squares += residuals.back() * residuals.back();
+    if (residuals.size() > kApart) products += residuals.back() * residuals[residuals.size() - 1 - kApart];
+  }
   fit.rms = std::sqrt(squares / std::max(1, fit.count - 3));
+  fit.shared_variance = std::max(0.0, products / std::max(1, fit.count - 3));
   return fit;
 }
 
@@ -120,13 +119,12 @@ std::optional<ArcFit> consensus_arc(const std::vector<ArcPoint>& points, double 
 
 std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search,
                                   Polarity polarity) {
-  const bool invert = polarity == Polarity::dark;
   const double outward = search.at_start ? -1.0 : 1.0;
   const int inside_px = static_cast<int>(0.5 * search.diameter_px),
             outside_px = static_cast<int>(0.5 * search.diameter_px);
   std::vector<double> body;
   for (int k = -2 * inside_px; k < -inside_px / 2; ++k) {
-    const double level = band_level(image, frame, search.station_px + outward * k, search, invert);
+    const double level = band_level(image, frame, search.station_px + outward * k, search, polarity);
     if (level >= 0) body.push_back(level);
   }
   if (body.size() < 8) return std::nullopt;
@@ -136,7 +134,7 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
   const int half = std::max(6, static_cast<int>(0.2 * search.diameter_px));
   std::vector<double> levels;
   for (int k = -inside_px - half; k <= outside_px + half; ++k)
-    levels.push_back(band_level(image, frame, search.station_px + outward * k, search, invert));
+    levels.push_back(band_level(image, frame, search.station_px + outward * k, search, polarity));
   const auto usable = static_cast<std::size_t>(
       std::find_if(levels.begin() + inside_px + half, levels.end(), [](double v) { return v < 0; }) - levels.begin());
   const auto mean = [&](std::size_t from, std::size_t to) {
@@ -193,8 +191,11 @@ LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const 
   if (!arc || arc->count < reach) return end;
   end.visible = true;
   end.station_px = arc->coefficients[0];
-  // Haze moves neighbouring rows together: one independent point in five.
-  end.sigma_px = std::max(0.01, std::sqrt(5 * arc->apex_variance) * arc->rms);
+  // One independent point in five rows. Haze moves the end as a whole too, which no residual about the arc shows: by
+  // about three times of what it bends it.
+  constexpr double kRowsTogether = 5.0, kAsAWhole = 3.0;
+  end.sigma_px = std::max(0.01, std::sqrt(kRowsTogether * arc->apex_variance * arc->rms * arc->rms +
+                                          kAsAWhole * kAsAWhole * arc->shared_variance));
   return end;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "node/edge/body_brightness.h"
 #include "node/edge/edge_config.h"
 #include "node/edge/forging_ends.h"
 #include "node/edge/rim_edges.h"
@@ -48,7 +49,7 @@ EndSearch describe_end(const Segmentation& s, bool at_start) {
 // The segmentation's rim with gaps closed linearly, carried on to the stations given.
 ExpectedRim expected_rim(const Segmentation& s, RimSide side, int first, int last) {
   const auto& from = side == RimSide::upper ? s.upper_offset_px : s.lower_offset_px;
-  ExpectedRim rim{side, first, {}};
+  ExpectedRim rim{side, first, {}, {}};
   std::ptrdiff_t before = -1;
   std::vector<double> closed(from.begin(), from.end());
   for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(closed.size()); ++i) {
@@ -131,8 +132,10 @@ Silhouette locate_edges(const cv::Mat& image, const Segmentation& segmentation, 
   if (silhouette.end.visible) last = silhouette.end.station_px + kBeyondPx;
 
   const int from = static_cast<int>(std::floor(first)), to = static_cast<int>(std::ceil(last));
-  const ExpectedRim upper = expected_rim(segmentation, RimSide::upper, from, to);
-  const ExpectedRim lower = expected_rim(segmentation, RimSide::lower, from, to);
+  ExpectedRim upper = expected_rim(segmentation, RimSide::upper, from, to);
+  ExpectedRim lower = expected_rim(segmentation, RimSide::lower, from, to);
+  upper.body = body_brightness(image, frame, from, upper.offset_px, lower.offset_px, polarity);
+  lower.body = upper.body;
   RimEdges upper_edges = find_rim_edges(image, frame, upper, polarity, method, config);
   RimEdges lower_edges = find_rim_edges(image, frame, lower, polarity, method, config);
   std::vector<float> steps(upper_edges.step);

@@ -15,6 +15,7 @@ struct EdgePoint {
   double magnitude = 0.0;       ///< gradient magnitude, share of full scale per px
   double direction_deg = 90.0;  ///< gradient direction against the forging axis; 90 = perpendicular
   double sigma_px = 0.0;        ///< expected standard deviation of the offset
+  double body_share = 1.0;      ///< step across the edge over that from its outside up to the body's brightness
 };
 
 struct LocatedEnd {

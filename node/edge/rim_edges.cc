@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "node/edge/body_brightness.h"
 #include "node/edge/edge_path.h"
 #include "node/edge/scan_lines.h"
 #include "node/edge/step_edges.h"
@@ -112,6 +114,23 @@ SobelGradient sobel_at(const cv::Mat& image, const ObservedPoint& p, double full
   return {gx / (8 * full_scale), gy / (8 * full_scale)};
 }
 
+// The means some px off the edge, clear of its blur, against the body's brightness.
+double body_share(const cv::Mat& image, const SilhouetteFrame& frame, const ExpectedRim& rim, const EdgePoint& point,
+                  Polarity polarity) {
+  constexpr int kNear = 3, kFar = 6;
+  const auto index = static_cast<std::size_t>(point.station_px - rim.first_station_px);
+  const float body = index < rim.body.size() ? rim.body[index] : std::numeric_limits<float>::quiet_NaN();
+  if (std::isnan(body)) return 1.0;
+  float inside = 0, outside = 0;
+  for (int k = kNear; k <= kFar; ++k) {
+    const double inward = inward_sign(rim.side) * k;
+    inside += grey_at(image, frame.at(point.station_px, point.offset_px + inward), polarity);
+    outside += grey_at(image, frame.at(point.station_px, point.offset_px - inward), polarity);
+  }
+  constexpr float kCount = kFar - kNear + 1;
+  return share_of_body(outside / kCount, inside / kCount, body);
+}
+
 struct PlacedEdge {
   double station_px, offset_px, sigma_px;
   float step;
@@ -185,6 +204,7 @@ RimEdges find_rim_edges(const cv::Mat& image, const SilhouetteFrame& frame, cons
     const double across = sign * (g.y * frame.direction_x - g.x * frame.direction_y);
     point.magnitude = std::hypot(g.x, g.y);
     point.direction_deg = std::atan2(across, along) * 180 / std::numbers::pi;
+    point.body_share = body_share(image, frame, rim, point, polarity);
   }
   return out;
 }

@@ -15,6 +15,7 @@ struct ExpectedRim {
   RimSide side = RimSide::upper;
   int first_station_px = 0;
   std::vector<double> offset_px;  ///< NaN: do not look there
+  std::vector<float> body;        ///< brightness of the body, one a station; NaN: unknown
 };
 
 /// The edge points of one rim, with the step across it.

@@ -13,18 +13,15 @@ struct FilterConfig {
   int min_region_length = 8;         // shorter regions are invalid; ours
   double min_region_strength = 0.2;  // mean magnitude over that of the whole rim; ours
 
-  int best_rim_window = 20;      // of `best`; its weights let it be wider than [C]'s without bending at steps; ours
-  int best_axis_window = 40;     // ours
-  int step_window = 10;          // stations on either side that decide whether the rim steps; ours
-  double min_step_px = 0.7;      // smaller steps are smoothed over; ours
-  double min_kink = 0.12;        // change of a rim's slope that ends a stretch, px per station; ours
-  double lone_step_price = 0.8;  // stretch, in diameters, that pays for a step which the other rim does not share; ours
-  double min_shared_step_px = 2.5;   // smaller steps of both rims at one place may be chance; ours
-  int max_chain_gap = 600;           // longest stretch without trusted rim that a chain bridges; ours
+  int best_rim_window = 20;          // of `best`; its weights let it be wider than [C]'s without bending at steps; ours
+  int best_axis_window = 40;         // ours
+  int step_window = 10;              // stations on either side that decide whether the rim steps; ours
+  double min_step_px = 0.7;          // smaller steps are smoothed over; ours
+  double min_kink = 0.12;            // change of a rim's slope that ends a stretch, px per station; ours
   int agreement_window = 240;        // over which the middle of the rims is smooth; ours
   double min_disagreement_px = 0.5;  // of the middle, from which the rim further in is not trusted; ours
 
-  double min_coverage = 0.15;  // share of the length with both rims trusted; ours
+  double min_coverage = 0.08;  // share of the length with both rims trusted; ours
   int min_points = 50;         // of each rim; ours
 
   [[nodiscard]] Result<void> validate() const;

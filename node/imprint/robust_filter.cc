@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "node/imprint/rim_chain.h"
 #include "node/imprint/rim_steps.h"
 
 namespace imprint {
@@ -18,15 +17,6 @@ double quantile(std::vector<double> values, double share) {
 }
 
 double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
-
-double median_width(const RimCurve& upper, const RimCurve& lower) {
-  std::vector<double> widths;
-  for (std::size_t i = 0, k = 0; i < upper.size() && k < lower.size();) {
-    if (upper[i].station_px == lower[k].station_px) widths.push_back(lower[k].offset_px - upper[i].offset_px);
-    upper[i].station_px <= lower[k].station_px ? ++i : ++k;
-  }
-  return median(widths);
-}
 
 // How restless the gradient's direction is about each point, deg: root mean square off the rim's usual direction. A rim
 // against the background is straight over a few px; the border of scale is ragged.
@@ -47,6 +37,7 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
 
 // What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
+  constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
   RimCurve curve;
   if (points.empty()) return curve;
   curve.reserve(points.size());
@@ -60,10 +51,12 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   const double calm_deg = std::max(1.0, quantile(unrest, 0.3));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const EdgePoint& p = points[i];
+    const double by_body = std::clamp((p.body_share - kDarkShare) / (kBrightShare - kDarkShare), 0.0, 1.0);
     const double by_magnitude = std::min(1.0, p.magnitude / (0.7 * magnitude + 1e-9));
     const double by_direction = std::pow(std::min(1.0, 2.5 * calm_deg / std::max(1e-3, unrest[i])), 2);
     const double excess = std::max(1.0, p.sigma_px / (1.5 * sigma));
-    curve.push_back({static_cast<double>(p.station_px), p.offset_px, by_magnitude * by_direction / (excess * excess)});
+    curve.push_back(
+        {static_cast<double>(p.station_px), p.offset_px, by_body * by_magnitude * by_direction / (excess * excess)});
   }
   return curve;
 }
@@ -201,10 +194,6 @@ FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& c
   const double noise_upper = rim_noise_px(upper), noise_lower = rim_noise_px(lower);
   const std::vector<double> upper_cuts = find_cuts(upper, noise_upper, config),
                             lower_cuts = find_cuts(lower, noise_lower, config);
-  const double diameter_px = median_width(upper, lower);
-  const RimCurve upper_before = upper;
-  keep_likeliest_course(upper, upper_cuts, lower, noise_upper, diameter_px, config);
-  keep_likeliest_course(lower, lower_cuts, upper_before, noise_lower, diameter_px, config);
   reject_disagreement(upper, lower, config);
 
   FilteredCurves out;
