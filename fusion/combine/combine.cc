@@ -64,24 +64,13 @@ EndPlanes find_ends(std::span<const ObservedForging> observations, std::span<con
   return planes;
 }
 
-/// Radius along `axis` from the first observation's own tangents.
-std::vector<double> first_radii(const ObservedForging& observed, double step_mm, std::size_t nodes) {
-  std::vector<std::vector<double>> seen(nodes);
-  for (const ObservedSection& section : observed.sections)
-    for (const TangentPlane& tangent : section.tangents) {
-      const auto i = static_cast<std::size_t>(
-          std::clamp<long>(std::lround(tangent.s_mm / step_mm), 0, static_cast<long>(nodes) - 1));
-      seen[i].push_back(tangent.offset_mm - tangent.normal_world.dot(section.axis_world_mm));
-    }
-  std::vector<double> radii(nodes, 0.0);
-  double previous = observed.radius_mm;
+/// Radius along the first observation's own axis, at equal steps.
+std::vector<double> first_radii(const ObservedForging& observed, std::size_t nodes) {
+  std::vector<double> radii(nodes);
+  const auto last = static_cast<double>(observed.sections.size() - 1);
   for (std::size_t i = 0; i < nodes; ++i) {
-    if (!seen[i].empty()) {
-      std::nth_element(seen[i].begin(), seen[i].begin() + static_cast<std::ptrdiff_t>(seen[i].size() / 2),
-                       seen[i].end());
-      previous = seen[i][seen[i].size() / 2];
-    }
-    radii[i] = previous;
+    const double place = last * static_cast<double>(i) / static_cast<double>(nodes - 1);
+    radii[i] = observed.sections[static_cast<std::size_t>(std::lround(place))].radius_mm;
   }
   return radii;
 }
@@ -211,7 +200,7 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
   const int nodes = config.sections;
   double length = (observations[0].end_world_mm - observations[0].start_world_mm).norm();
   AxisCurve axis = first_axis(observations[0], placements[0], length, nodes);
-  std::vector<double> radii = first_radii(observations[0], axis.x_step_mm, axis.yz_mm.size());
+  std::vector<double> radii = first_radii(observations[0], axis.yz_mm.size());
   EndPlanes ends = find_ends(observations, placements, axis, radii, config.placing_sigma_mm, forging, config);
   for (std::size_t k = 0; k < placements.size(); ++k) placements[k].shift_mm.x() += ends.shift_mm[k] - ends.first.x_mm;
   length = ends.last.x_mm - ends.first.x_mm;

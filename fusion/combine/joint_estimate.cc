@@ -138,7 +138,8 @@ class JointSolver {
                 rows_.push_back({.viewer = viewers_.size(),
                                  .ray_world = tangent.ray_world,
                                  .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight,
-                                 .x_mm = tangent.s_mm});
+                                 .x_mm = tangent.s_mm,
+                                 .trust = tangent.stray ? 0.0 : 1.0});
           std::sort(rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.end(),
                     [](const Row& a, const Row& b) { return a.x_mm < b.x_mm; });
           for (std::size_t i = first + 1; i < rows_.size(); ++i) rows_[i].continues = true;

@@ -10,7 +10,7 @@
 #include <Eigen/Dense>
 
 #include "fusion/triangulate/first_axis.h"
-#include "fusion/triangulate/section_fit.h"
+#include "fusion/triangulate/rim_tangents.h"
 
 namespace imprint {
 namespace {

@@ -23,6 +23,7 @@ struct TangentPlane {
   double weight = 1.0;    ///< 0 to 1, from the imprint
   int camera = 0;         ///< index into `cameras` of the observation
   bool upper = false;     ///< which rim of that camera
+  bool stray = false;     ///< too far from what most rims agree on to have a say before the rod is known better
   double s_mm = 0.0;      ///< where along the observation's straight line the plane touches
   Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();  ///< from the camera's centre to the rim point, length 1
 };
@@ -39,6 +40,7 @@ struct EndReading {
 struct ObservedSection {
   double s_mm = 0.0;  ///< along the observation's straight line from its start
   Eigen::Vector3d axis_world_mm = Eigen::Vector3d::Zero();
+  double radius_mm = 0.0;  ///< on which most rims agree
   std::vector<TangentPlane> tangents;
 };
 
