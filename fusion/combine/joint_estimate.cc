@@ -35,6 +35,7 @@ struct Row {
   bool continues = false;     ///< the same rim as the row before, one station on
   double x_mm = 0.0;
   double residual_mm = 0.0;
+  double from_circle_mm = 0.0;  ///< from the section without its out-of-round
   double trust = 1.0;
   bool used = false;
 };
@@ -74,6 +75,9 @@ class JointSolver {
       nodes_[i](kRadius) = start_radius_mm[i];
     }
     collect_rows(observations);
+    std::vector<double> out_of_round;
+    for (const ObservedForging& observed : observations) out_of_round.push_back(observed.out_of_round_mm);
+    out_of_round_mm_ = std::max(median(out_of_round), 2e-3 * radius_mm_);
     place_sum_.assign(observations.size(), Vector6d::Zero());
     camera_solution_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(viewers_.size()) * kCameraUnknowns);
     // Start wide: what the first axis leaves over must not be taken for faults.
@@ -260,7 +264,7 @@ class JointSolver {
     // The last round leaves amounts and solution belonging to each other.
     if (last) return true;
     learn_noise(equations);
-    prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()));
+    prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()), out_of_round_mm_);
     return true;
   }
 
@@ -314,6 +318,7 @@ class JointSolver {
       if (viewer.observation > 0)
         model += equation.place.dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
       row.residual_mm = equation.value_mm - model;
+      row.from_circle_mm = row.residual_mm + equation.coefficients.tail<2 * kHarmonics>().dot(node.tail<2 * kHarmonics>());
     }
   }
 
@@ -326,6 +331,12 @@ class JointSolver {
       placements_[k].R = turn * placements_[k].R;
       placements_[k].shift_mm = turn * (placements_[k].shift_mm - middle) + middle + move.head<3>();
     }
+  }
+
+  /// What lies far out of what the rod is out of round belongs to something else (Tukey's biweight).
+  double belongs(const Row& row) const {
+    const double z = row.from_circle_mm / (4.685 * out_of_round_mm_);
+    return std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
   }
 
   /// Scatter of the tangents about the model, how far it is correlated along the rims, and whom to trust.
@@ -346,12 +357,12 @@ class JointSolver {
       const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
       if (e.extra_variance_mm2 > variance) {
         // What a shoulder leaves open is no scatter of the edge.
-        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2));
+        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2)) * belongs(row);
         continue;
       }
       // A tangent that the estimate bends itself to says less of the scatter.
       const double open = std::min(1.0, row.trust * fitted / (variance * correlation_));
-      row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance);
+      row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance) * belongs(row);
       sum += row.trust * row.residual_mm * row.residual_mm / row.variance_mm2;
       count += 1.0 - open;
       if (row.continues && r > 0 && rows_[r - 1].used) {
@@ -386,6 +397,7 @@ class JointSolver {
   std::vector<Vector6d> place_sum_;
   Eigen::VectorXd camera_solution_;
   double noise_scale_ = 1.0;
+  double out_of_round_mm_ = 0.0;  ///< robust sigma of the tangents about the circles
   double correlation_ = 1.0;
 };
 

@@ -13,6 +13,8 @@ double spectrum(int k) { return static_cast<double>(kFirstHarmonic) / k; }
 /// between two shoulders. For the estimate a shorter length keeps them even; the interval takes the whole.
 constexpr double kEstimateShare = 0.3;
 
+constexpr double kLeastBend = 1e-5;
+
 /// Precision of one step of an integrated random walk (value, slope) with unit density.
 Eigen::Matrix2d bend_precision(double h) {
   Eigen::Matrix2d covariance;
@@ -90,14 +92,15 @@ void SectionPrior::add_to(BorderedSystem& system, Use use) const {
 }
 
 void SectionPrior::learn(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                         std::span<const NodeMatrix> with_next, int observations) {
-  learn_harmonics(nodes, own, observations);
+                         std::span<const NodeMatrix> with_next, int observations,
+                         double out_of_round_mm) {
+  learn_harmonics(nodes, own, observations, out_of_round_mm);
   learn_axis(nodes, own, with_next);
   learn_radius(nodes, own, with_next);
 }
 
 void SectionPrior::learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                                   int observations) {
+                                   int observations, double out_of_round_mm) {
   const std::size_t n = nodes.size();
   std::array<Amount, kHarmonics> amounts{};
   for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
@@ -121,9 +124,13 @@ void SectionPrior::learn_harmonics(std::span<const NodeVector> nodes, std::span<
   }
   // The more observations, the more each harmonic speaks for itself.
   const double own_share = std::clamp((observations - 2) / 3.0, 0.0, 0.9);
+  double shape = 0.0;
+  for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) shape += spectrum(order) * spectrum(order);
+  // The axis and the mean of six tangents take some of their variance.
+  const double most = 1.5 * out_of_round_mm * out_of_round_mm / shape;
   for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {
     const auto k = static_cast<std::size_t>(order - kFirstHarmonic);
-    const double pooled = all.variance() * spectrum(order) * spectrum(order);
+    const double pooled = std::min(all.variance(), most) * spectrum(order) * spectrum(order);
     harmonic_sigma_mm_[k] =
         std::max(1e-5 * radius_mm_, std::sqrt(own_share * amounts[k].variance() + (1.0 - own_share) * pooled));
   }
@@ -177,7 +184,7 @@ void SectionPrior::learn_axis(std::span<const NodeVector> nodes, std::span<const
     }
   }
   // Between a rod straight to 1e-4 of its length and one bent by a fifth of it.
-  bend_density_ = std::clamp(amount.variance(), 1e-8 / length_mm_, 0.04 / length_mm_);
+  bend_density_ = std::clamp(amount.variance(), kLeastBend / length_mm_, 0.04 / length_mm_);
 }
 
 void SectionPrior::learn_radius(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,

@@ -32,8 +32,9 @@ class SectionPrior {
 
   /// Learns the amounts from estimates and their covariances (expectation maximisation). `observations` says how far
   /// the harmonics can be told apart: below three, their spectrum keeps its shape and only its size is learnt.
+  /// `out_of_round_mm`: robust sigma of the tangents about the sections' circles, which bounds what is learnt.
   void learn(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, std::span<const NodeMatrix> with_next,
-             int observations);
+             int observations, double out_of_round_mm);
 
   [[nodiscard]] double harmonic_sigma_mm(int k) const {
     return harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)];
@@ -43,7 +44,8 @@ class SectionPrior {
   [[nodiscard]] double radius_density() const { return radius_density_; }
 
  private:
-  void learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, int observations);
+  void learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, int observations,
+                       double out_of_round_mm);
   [[nodiscard]] double shape_length_mm(std::span<const NodeVector> nodes) const;
   void learn_axis(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
                   std::span<const NodeMatrix> with_next);

@@ -151,6 +151,7 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
   }
   observed.warnings.insert(observed.warnings.end(), ends.warnings.begin(), ends.warnings.end());
   observed.radius_mm = rod.median_radius_mm(ends.planes.first.x_mm, ends.planes.last.x_mm);
+  observed.out_of_round_mm = rod.scatter_mm;
   observed.ends = std::move(ends.readings);
   observed.start_world_mm = rod.axis.at(ends.planes.first.x_mm).point_mm;
   observed.end_world_mm = rod.axis.at(ends.planes.last.x_mm).point_mm;
