@@ -50,6 +50,20 @@ AxisCurve straight_axis(const Eigen::Vector3d& origin_mm, const Eigen::Vector3d&
   return axis;
 }
 
+AxisCurve over(const AxisCurve& axis, double low_mm, double high_mm) {
+  AxisCurve stretched = axis;
+  const auto samples = static_cast<int>(axis.yz_mm.size());
+  stretched.x_first_mm = low_mm;
+  stretched.x_step_mm = (high_mm - low_mm) / (samples - 1);
+  stretched.yz_mm.clear();
+  for (int i = 0; i < samples; ++i) {
+    const Eigen::Vector3d p = axis.at(low_mm + i * stretched.x_step_mm).point_mm - axis.origin_mm;
+    stretched.yz_mm.emplace_back((axis.R_line * p).tail<2>());
+  }
+  stretched.set_slopes();
+  return stretched;
+}
+
 std::optional<RimContact> touch(const AxisCurve& axis, const Eigen::Vector3d& center_mm, const Eigen::Vector3d& ray,
                                 double x_guess_mm) {
   RimContact contact;

@@ -31,6 +31,9 @@ struct AxisCurve {
 AxisCurve straight_axis(const Eigen::Vector3d& origin_mm, const Eigen::Vector3d& direction, double x_first_mm,
                         double x_last_mm, int samples);
 
+/// `axis` with as many samples, over [low_mm, high_mm] of its line.
+AxisCurve over(const AxisCurve& axis, double low_mm, double high_mm);
+
 /// Where a viewing ray touches a bar around `axis`, and the viewing plane there.
 struct RimContact {
   double x_mm = 0.0;         ///< along the axis curve's line

@@ -18,23 +18,35 @@ namespace {
 constexpr int kThirds = 3;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-double median(std::vector<double>& values) {
-  if (values.empty()) return kNan;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+/// Where values lie closest together: the half of them that spans least, halved again and again. Right as long as the
+/// right ones agree, be they the smaller part.
+double half_sample_mode(std::vector<double>& values) {
+  if (values.size() < 3) return kNan;
+  std::sort(values.begin(), values.end());
+  auto first = values.begin();
+  std::ptrdiff_t count = values.end() - first;
+  while (count > 2) {
+    const std::ptrdiff_t half = (count + 1) / 2;
+    auto best = first;
+    for (auto i = first; i + half <= first + count; ++i)
+      if (*(i + half - 1) - *i < *(best + half - 1) - *best) best = i;
+    first = best;
+    count = half;
+  }
+  return 0.5 * (first[0] + first[count - 1]);
 }
 
 /// What one camera says of the bar about a common axis, in each third of its length.
 struct Testimony {
-  std::array<double, kThirds> half_width_mm{};
+  std::array<double, kThirds> half_width_mm{};    ///< less the radius of the rod all agree on
   std::array<double, kThirds> across_mm{};        ///< place of the axis along `across`
   std::array<Eigen::Vector2d, kThirds> across{};  ///< direction in y, z
   std::optional<double> first_mm, last_mm;        ///< ends along the axis
 };
 
-Testimony testimony(const CameraView& view, const AxisCurve& axis, double radius_mm) {
+Testimony testimony(const CameraView& view, const RodConsensus& rod) {
   Testimony said;
+  const AxisCurve& axis = rod.axis;
   const std::vector<RimTangent> tangents = rim_tangents(std::span(&view, 1), axis);
   const double length = axis.x_step_mm * static_cast<double>(axis.yz_mm.size() - 1);
   for (int third = 0; third < kThirds; ++third) {
@@ -43,20 +55,20 @@ Testimony testimony(const CameraView& view, const AxisCurve& axis, double radius
     for (const RimTangent& tangent : tangents) {
       const double share = (tangent.contact.x_mm - axis.x_first_mm) / length * kThirds;
       if (share < third || share >= third + 1) continue;
-      (tangent.upper ? upper : lower).push_back(tangent.contact.distance_mm);
+      (tangent.upper ? upper : lower).push_back(rod.deviation_mm(tangent.contact));
       const Eigen::Vector2d n = (axis.R_line * tangent.contact.normal).tail<2>();
       normal += tangent.upper ? n : Eigen::Vector2d(-n);
     }
     const auto k = static_cast<std::size_t>(third);
-    const double above = median(upper);
-    const double below = median(lower);
+    const double above = half_sample_mode(upper);
+    const double below = half_sample_mode(lower);
     said.half_width_mm[k] = 0.5 * (above + below);
     said.across_mm[k] = 0.5 * (above - below);
     said.across[k] = normal.normalized();
   }
   const bool along = runs_along(view, axis);
-  said.first_mm = end_position(view, along ? view.start : view.end, axis, radius_mm, false);
-  said.last_mm = end_position(view, along ? view.end : view.start, axis, radius_mm, true);
+  said.first_mm = end_position(view, along ? view.start : view.end, axis, rod.radius_mm.front(), false);
+  said.last_mm = end_position(view, along ? view.end : view.start, axis, rod.radius_mm.back(), true);
   return said;
 }
 
@@ -126,10 +138,21 @@ double end_misfit(std::span<const Testimony> all) {
   return widest;
 }
 
+/// `axis` over exactly the stretch on which the rims touch.
+AxisCurve over_rims(const AxisCurve& axis, std::span<const RimTangent> tangents) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const RimTangent& tangent : tangents) {
+    low = std::min(low, tangent.contact.x_mm);
+    high = std::max(high, tangent.contact.x_mm);
+  }
+  return over(axis, low, high);
+}
+
 /// A set of cameras, the axis they see and how well they agree.
 struct Agreement {
   std::vector<CameraView> views;
-  AxisCurve axis;
+  RodConsensus rod;
   double contradiction_mm = std::numeric_limits<double>::infinity();  ///< of widths and places
   double misfit_mm = std::numeric_limits<double>::infinity();         ///< of widths, places and ends
 };
@@ -138,16 +161,12 @@ Result<Agreement> agreement_of(std::vector<CameraView> views, const ForgingSpec&
                                const TriangulateConfig& config) {
   const double limit = config.max_ray_distance_share * forging.diameter_max_mm;
   const std::vector<Eigen::Vector3d> points = triangulate_axis_points(views, limit);
-  auto line = line_through(points, forging.axis_direction_world, 50);
+  auto line = line_through(points, forging.axis_direction_world, config.sections);
   if (!line) return pass_on(line.error());
-  Agreement agreement{.views = std::move(views), .axis = *line};
-  std::vector<double> radii;
-  for (const RimTangent& tangent : rim_tangents(agreement.views, agreement.axis))
-    radii.push_back(tangent.contact.distance_mm);
-  const double radius = median(radii);
-  if (!(radius > 0.0)) return job_failed("the rims of the cameras do not enclose the axis their middles form");
+  Agreement agreement{.views = std::move(views), .rod = {}};
+  agreement.rod = agree_on_rod(agreement.views, over_rims(*line, rim_tangents(agreement.views, *line)), forging);
   std::vector<Testimony> all;
-  for (const CameraView& view : agreement.views) all.push_back(testimony(view, agreement.axis, radius));
+  for (const CameraView& view : agreement.views) all.push_back(testimony(view, agreement.rod));
   agreement.contradiction_mm = std::max(width_misfit(all), place_misfit(all));
   agreement.misfit_mm = std::max(agreement.contradiction_mm, end_misfit(all));
   return agreement;
@@ -223,7 +242,7 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
       std::vector<CameraView> others = views;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(drop));
       auto trial = agreement_of(std::move(others), forging, config);
-      if (!trial || widest_angle_deg(trial->views, trial->axis) < config.min_view_angle_deg) continue;
+      if (!trial || widest_angle_deg(trial->views, trial->rod.axis) < config.min_view_angle_deg) continue;
       trials.emplace_back(std::move(*trial), views[drop].camera);
     }
     if (trials.empty()) break;
@@ -245,14 +264,14 @@ Result<AgreeingViews> agreeing_views(std::vector<CameraView> views, std::span<co
   }
   if (!best) return pass_on(best.error());
   if (best->views.size() == 2 && best->contradiction_mm > limit) result.disagreement_mm = best->contradiction_mm;
-  const double angle = widest_angle_deg(best->views, best->axis);
+  const double angle = widest_angle_deg(best->views, best->rod.axis);
   if (angle < config.min_view_angle_deg)
     return job_failed(
         "cameras {} look in nearly the same direction: {:.1f} deg apart as seen from the forging, at least {:.0f} deg "
         "needed",
         names(best->views, ids), angle, config.min_view_angle_deg);
   result.views = std::move(best->views);
-  result.axis = std::move(best->axis);
+  result.rod = std::move(best->rod);
   return result;
 }
 

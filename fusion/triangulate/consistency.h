@@ -6,16 +6,17 @@
 
 #include "fusion/triangulate/axis_curve.h"
 #include "fusion/triangulate/camera_view.h"
+#include "fusion/triangulate/rod_consensus.h"
 #include "fusion/triangulate/triangulate_config.h"
 #include "lib/result/result.h"
 #include "lib/rig/rig.h"
 
 namespace imprint {
 
-/// The cameras of one observation that agree with each other, and the axis they see.
+/// The cameras of one observation that agree with each other, and the rod they see.
 struct AgreeingViews {
   std::vector<CameraView> views;
-  AxisCurve axis;
+  RodConsensus rod;
   std::vector<std::pair<int, std::string>> excluded;  ///< CameraView::camera, why
   double disagreement_mm = 0.0;  ///< left among the views because it cannot be told which one is wrong
 };

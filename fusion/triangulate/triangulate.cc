@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include "fusion/triangulate/consistency.h"
@@ -28,31 +27,6 @@ void exclude(ObservedForging& observed, int camera, std::string reason) {
   share.excluded = true;
   share.reason = std::move(reason);
   observed.warnings.push_back(fmt::format("camera {} left out: {}", share.id, share.reason));
-}
-
-/// `axis` sampled anew over [low, high].
-AxisCurve over(const AxisCurve& axis, double low_mm, double high_mm, int samples) {
-  AxisCurve stretched = axis;
-  stretched.x_first_mm = low_mm;
-  stretched.x_step_mm = (high_mm - low_mm) / (samples - 1);
-  stretched.yz_mm.clear();
-  for (int i = 0; i < samples; ++i) {
-    const Eigen::Vector3d p = axis.at(low_mm + i * stretched.x_step_mm).point_mm - axis.origin_mm;
-    stretched.yz_mm.emplace_back((axis.R_line * p).tail<2>());
-  }
-  stretched.set_slopes();
-  return stretched;
-}
-
-/// `axis` over exactly the stretch on which the rims touch.
-AxisCurve over_rims(const AxisCurve& axis, std::span<const RimTangent> tangents, int samples) {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -low;
-  for (const RimTangent& tangent : tangents) {
-    low = std::min(low, tangent.contact.x_mm);
-    high = std::max(high, tangent.contact.x_mm);
-  }
-  return over(axis, low, high, samples);
 }
 
 std::vector<ObservedSection> sections_of(const RodConsensus& rod, std::span<const CameraView> views,
@@ -137,15 +111,14 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
                     agreeing->disagreement_mm));
   }
 
-  AxisCurve start = over_rims(agreeing->axis, rim_tangents(agreeing->views, agreeing->axis), config.sections);
-  RodConsensus rod = agree_on_rod(agreeing->views, std::move(start), forging);
+  RodConsensus rod = std::move(agreeing->rod);
   RodEnds ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm);
   for (int iteration = 0; iteration < 2; ++iteration) {
     // Beyond the ends the outline follows the end circles, or something else, which must not bend the axis.
     const double length = ends.planes.last.x_mm - ends.planes.first.x_mm;
     if (!(length > rod.median_radius_mm(ends.planes.first.x_mm, ends.planes.last.x_mm)))
       return job_failed("the ends seen by the cameras lie {:.1f} mm apart, which is no rod", length);
-    rod = agree_on_rod(agreeing->views, over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm, config.sections),
+    rod = agree_on_rod(agreeing->views, over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm),
                        forging);
     ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm);
   }
