@@ -63,7 +63,7 @@ class JointSolver {
         shift_sigma_mm_(shift_sigma_mm),
         radius_mm_(median(start_radius_mm)),
         end_margin_(1.0 + 2.0 * shift_sigma_mm / start.x_step_mm),
-        prior_(static_cast<int>(start.yz_mm.size()), start.x_step_mm, radius_mm_, config.out_of_round_share,
+        prior_(start_radius_mm, start.x_step_mm, radius_mm_, config.out_of_round_share,
                config.out_of_round_length_share * length_mm_),
         system_(0, 0) {
     nodes_.assign(start.yz_mm.size(), NodeVector::Zero());

@@ -25,7 +25,9 @@ constexpr int sine_of(int k) { return cosine_of(k) + 1; }
 /// their shape over a stretch (a stationary process). The amounts are learnt from the tangents themselves.
 class SectionPrior {
  public:
-  SectionPrior(int nodes, double step_mm, double radius_mm, double out_of_round_share, double out_of_round_length_mm);
+  /// `start_radius_mm`: one a node; where it steps the radius stays free to.
+  SectionPrior(std::span<const double> start_radius_mm, double step_mm, double radius_mm, double out_of_round_share,
+               double out_of_round_length_mm);
 
   enum class Use { estimate, interval };
   void add_to(BorderedSystem& system, Use use) const;
@@ -59,6 +61,7 @@ class SectionPrior {
   double harmonic_length_mm_;
   double bend_density_;               ///< variance of the slope gained per mm
   double radius_density_;             ///< mm^2 of variance of the radius per mm
+  std::vector<double> radius_step_mm_;  ///< of the start from each node to the next; 0 but at a shoulder
   std::vector<double> radius_trust_;  ///< of each step between nodes: near 0 at a shoulder
 };
 
