@@ -6,7 +6,6 @@
 #include <catch2/catch.hpp>
 
 #include "fusion/triangulate/end_planes.h"
-#include "fusion/triangulate/savitzky_golay.h"
 #include "fusion/triangulate/triangulate_config.h"
 #include "tests/unit/fusion/triangulate/forging_views.h"
 
@@ -279,16 +278,6 @@ TEST_CASE("triangulate: a wrong config is refused by its key") {
   config.edge_sigma_px = 0.0;
   REQUIRE_FALSE(config.validate().has_value());
   CHECK(config.validate().error().message.find("edge_sigma_px") != std::string::npos);
-}
-
-TEST_CASE("savitzky_golay: keeps a parabola, ends included, and flattens noise") {
-  std::vector<double> parabola(60), weights(60, 1.0);
-  for (int i = 0; i < 60; ++i) parabola[static_cast<std::size_t>(i)] = 0.3 * i * i - 2.0 * i + 5.0;
-  const std::vector<double> kept = savitzky_golay(parabola, weights, 21);
-  for (std::size_t i = 0; i < 60; ++i) CHECK(kept[i] == Approx(parabola[i]).margin(1e-4));
-  std::vector<double> alternating(60);
-  for (std::size_t i = 0; i < 60; ++i) alternating[i] = i % 2 == 0 ? 1.0 : -1.0;
-  CHECK(std::abs(savitzky_golay(alternating, weights, 21)[30]) < 0.15);
 }
 
 TEST_CASE("end_planes: three readings on one side of a tilted face still give its middle") {
