@@ -63,8 +63,8 @@ class JointSolver {
         shift_sigma_mm_(shift_sigma_mm),
         radius_mm_(median(start_radius_mm)),
         end_margin_(1.0 + 2.0 * shift_sigma_mm / start.x_step_mm),
-        prior_(start_radius_mm, start.x_step_mm, radius_mm_, config.out_of_round_share,
-               config.out_of_round_length_share * length_mm_),
+        prior_(unseen_steps(observations, start_radius_mm, start.x_step_mm), start.x_step_mm, radius_mm_,
+               config.out_of_round_share, config.out_of_round_length_share * length_mm_),
         system_(0, 0) {
     nodes_.assign(start.yz_mm.size(), NodeVector::Zero());
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -73,6 +73,13 @@ class JointSolver {
       nodes_[i](kYSlope) = start.slope[i].x();
       nodes_[i](kZSlope) = start.slope[i].y();
       nodes_[i](kRadius) = start_radius_mm[i];
+    }
+    constexpr std::size_t kReach = 3;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      const auto near = start_radius_mm.subspan(i < kReach ? 0 : i - kReach);
+      const auto [low, high] = std::minmax_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(std::min(near.size(), 2 * kReach + 2)));
+      const bool step = *high - *low > 0.02 * *high;
+      radius_range_.emplace_back(step ? *low : start_radius_mm[i], step ? *high : start_radius_mm[i]);
     }
     collect_rows(observations);
     std::vector<double> out_of_round;
@@ -109,6 +116,31 @@ class JointSolver {
     std::vector<double> sorted(values.begin(), values.end());
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
     return sorted[sorted.size() / 2];
+  }
+
+  /// From each node to the next: how far the start's radius steps over a stretch where no tangent shows the step.
+  static std::vector<double> unseen_steps(std::span<const ObservedForging> observations,
+                                          std::span<const double> radius_mm, double step_mm) {
+    const auto last = static_cast<long>(radius_mm.size()) - 1;
+    std::vector<char> seen(radius_mm.size(), 0);
+    for (const ObservedForging& observed : observations)
+      for (const ObservedSection& section : observed.sections)
+        for (const TangentPlane& tangent : section.tangents)
+          if (!tangent.stray) seen[static_cast<std::size_t>(std::clamp(std::lround(tangent.s_mm / step_mm), 0L, last))] = 1;
+    constexpr long kShortest = 4;  // nodes of a stretch nobody sees
+    constexpr long kBeyond = 4;    // nodes on to where the radius is even again
+    std::vector<double> steps(radius_mm.size() - 1, 0.0);
+    for (long from = 0; from < last; ++from) {
+      long to = from;
+      while (to < last && !seen[static_cast<std::size_t>(to + 1)]) ++to;
+      if (to - from >= kShortest) {
+        const double step = radius_mm[static_cast<std::size_t>(std::min(to + kBeyond, last))] -
+                            radius_mm[static_cast<std::size_t>(std::max(from - kBeyond, 0L))];
+        for (long i = from; i <= std::min(to, last - 1); ++i) steps[static_cast<std::size_t>(i)] = step;
+      }
+      from = to;
+    }
+    return steps;
   }
 
   double median_variance() const {
@@ -333,9 +365,14 @@ class JointSolver {
     }
   }
 
-  /// What lies far out of what the rod is out of round belongs to something else (Tukey's biweight).
-  double belongs(const Row& row) const {
-    const double z = row.from_circle_mm / (4.685 * out_of_round_mm_);
+  /// What lies far out of what the rod is out of round belongs to something else (Tukey's biweight). Next to a step
+  /// any radius from the one to the other is on the rod.
+  double belongs(const Row& row, const Equation& equation) const {
+    const double radius = (1.0 - equation.share) * nodes_[equation.node](kRadius) +
+                          equation.share * nodes_[equation.node + 1](kRadius) + row.from_circle_mm;
+    const auto [low, high] = radius_range_[equation.node];
+    const double off = row.from_circle_mm - std::clamp(row.from_circle_mm, std::min(0.0, low - radius + row.from_circle_mm), std::max(0.0, high - radius + row.from_circle_mm));
+    const double z = off / (4.685 * out_of_round_mm_);
     return std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
   }
 
@@ -357,12 +394,12 @@ class JointSolver {
       const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
       if (e.extra_variance_mm2 > variance) {
         // What a shoulder leaves open is no scatter of the edge.
-        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2)) * belongs(row);
+        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2)) * belongs(row, e);
         continue;
       }
       // A tangent that the estimate bends itself to says less of the scatter.
       const double open = std::min(1.0, row.trust * fitted / (variance * correlation_));
-      row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance) * belongs(row);
+      row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance) * belongs(row, e);
       sum += row.trust * row.residual_mm * row.residual_mm / row.variance_mm2;
       count += 1.0 - open;
       if (row.continues && r > 0 && rows_[r - 1].used) {
@@ -394,6 +431,7 @@ class JointSolver {
   std::vector<Row> rows_;
   std::vector<NodeVector> nodes_;
   std::vector<NodeMatrix> own_, with_next_;
+  std::vector<std::pair<double, double>> radius_range_;  ///< about each node, of the start
   std::vector<Vector6d> place_sum_;
   Eigen::VectorXd camera_solution_;
   double noise_scale_ = 1.0;

@@ -13,9 +13,6 @@ double spectrum(int k) { return static_cast<double>(kFirstHarmonic) / k; }
 /// between two shoulders. For the estimate a shorter length keeps them even; the interval takes the whole.
 constexpr double kEstimateShare = 0.3;
 
-/// Of the radius, from one node to the next: what is a shoulder and no taper.
-constexpr double kShoulderShare = 0.004;
-
 constexpr double kLeastBend = 1e-5;
 
 /// Precision of one step of an integrated random walk (value, slope) with unit density.
@@ -37,22 +34,18 @@ struct Amount {
 
 }  // namespace
 
-SectionPrior::SectionPrior(std::span<const double> start_radius_mm, double step_mm, double radius_mm,
+SectionPrior::SectionPrior(std::vector<double> unseen_step_mm, double step_mm, double radius_mm,
                            double out_of_round_share, double out_of_round_length_mm)
     : step_mm_(step_mm),
       radius_mm_(radius_mm),
-      length_mm_(step_mm * static_cast<double>(start_radius_mm.size() - 1)),
+      length_mm_(step_mm * static_cast<double>(unseen_step_mm.size())),
       harmonic_length_mm_(out_of_round_length_mm),
       // A slope that changes by 0.02 over the length.
       bend_density_(4e-4 / length_mm_),
       // No opinion of the radius at first, so that shoulders show.
       radius_density_(0.01 * radius_mm * radius_mm / step_mm),
-      radius_step_mm_(start_radius_mm.size() - 1, 0.0),
-      radius_trust_(start_radius_mm.size() - 1, 1.0) {
-  for (std::size_t i = 0; i < radius_step_mm_.size(); ++i) {
-    const double step = start_radius_mm[i + 1] - start_radius_mm[i];
-    if (std::abs(step) > kShoulderShare * radius_mm) radius_step_mm_[i] = step;
-  }
+      unseen_step_mm_(std::move(unseen_step_mm)),
+      radius_trust_(unseen_step_mm_.size(), 1.0) {
   for (int k = kFirstHarmonic; k <= kLastHarmonic; ++k)
     harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)] = out_of_round_share * radius_mm * spectrum(k);
 }
@@ -93,7 +86,7 @@ void SectionPrior::add_to(BorderedSystem& system, Use use) const {
       next.block<2, 2>(place, place) += bend;
     }
     const double learnt = radius_density_ * step_mm_ / radius_trust_[k];
-    const double precision = 1.0 / std::max(learnt, radius_step_mm_[k] * radius_step_mm_[k]);
+    const double precision = 1.0 / std::max(learnt, unseen_step_mm_[k] * unseen_step_mm_[k]);
     own(kRadius, kRadius) += precision;
     next(kRadius, kRadius) += precision;
     system.upper[k](kRadius, kRadius) -= precision;

@@ -25,8 +25,8 @@ constexpr int sine_of(int k) { return cosine_of(k) + 1; }
 /// their shape over a stretch (a stationary process). The amounts are learnt from the tangents themselves.
 class SectionPrior {
  public:
-  /// `start_radius_mm`: one a node; where it steps the radius stays free to.
-  SectionPrior(std::span<const double> start_radius_mm, double step_mm, double radius_mm, double out_of_round_share,
+  /// `unseen_step_mm`: how far the radius steps from each node to the next where no tangent shows it; it stays free to.
+  SectionPrior(std::vector<double> unseen_step_mm, double step_mm, double radius_mm, double out_of_round_share,
                double out_of_round_length_mm);
 
   enum class Use { estimate, interval };
@@ -61,7 +61,7 @@ class SectionPrior {
   double harmonic_length_mm_;
   double bend_density_;               ///< variance of the slope gained per mm
   double radius_density_;             ///< mm^2 of variance of the radius per mm
-  std::vector<double> radius_step_mm_;  ///< of the start from each node to the next; 0 but at a shoulder
+  std::vector<double> unseen_step_mm_;
   std::vector<double> radius_trust_;  ///< of each step between nodes: near 0 at a shoulder
 };
 

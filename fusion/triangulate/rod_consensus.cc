@@ -65,6 +65,7 @@ class RadiusPath {
   // In units of what one rim point in full agreement gives.
   static constexpr double kStepCost = 6.0;
   static constexpr double kLevelCost = 0.5;
+  static constexpr int kTaper = 3;  // levels; a step changes more within a few samples
   using Levels = Eigen::Array<double, kLevels, 1>;
 
   [[nodiscard]] double radius(int level) const { return low_mm_ + pitch_mm_ * level; }
@@ -110,6 +111,7 @@ class RadiusPath {
       if (!within(axis, tangent.contact.x_mm)) continue;
       const int at = static_cast<int>(sample_of(axis, tangent.contact.x_mm));
       for (int i = std::max(0, at - kStepReach); i <= std::min(n - 1, at + kStepReach); ++i) {
+        if (std::abs(path[static_cast<std::size_t>(i)] - path[static_cast<std::size_t>(at)]) > kTaper) continue;
         const double level = radius(path[static_cast<std::size_t>(i)]);
         const double w = tangent.weight * redescending(tangent.contact.distance_mm - level, scale_mm_);
         sum[static_cast<std::size_t>(i)] += w * (tangent.contact.distance_mm - level);
