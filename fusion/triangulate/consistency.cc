@@ -18,22 +18,21 @@ namespace {
 constexpr int kThirds = 3;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Where values lie closest together: the half of them that spans least, halved again and again. Right as long as the
-/// right ones agree, be they the smaller part.
-double half_sample_mode(std::vector<double>& values) {
+/// Where most values lie close together: the middle of those within `width` of each other. Right as long as the right
+/// ones agree, be they the smaller part.
+double mode(std::vector<double>& values, double width) {
   if (values.size() < 3) return kNan;
   std::sort(values.begin(), values.end());
-  auto first = values.begin();
-  std::ptrdiff_t count = values.end() - first;
-  while (count > 2) {
-    const std::ptrdiff_t half = (count + 1) / 2;
-    auto best = first;
-    for (auto i = first; i + half <= first + count; ++i)
-      if (*(i + half - 1) - *i < *(best + half - 1) - *best) best = i;
-    first = best;
-    count = half;
+  std::size_t best = 0;
+  std::size_t most = 0;
+  std::size_t end = 0;
+  for (std::size_t first = 0; first < values.size(); ++first) {
+    while (end < values.size() && values[end] - values[first] <= width) ++end;
+    if (end - first <= most) continue;
+    most = end - first;
+    best = first;
   }
-  return 0.5 * (first[0] + first[count - 1]);
+  return values[best + most / 2];
 }
 
 /// What one camera says of the bar about a common axis, in each third of its length.
@@ -60,8 +59,8 @@ Testimony testimony(const CameraView& view, const RodConsensus& rod) {
       normal += tangent.upper ? n : Eigen::Vector2d(-n);
     }
     const auto k = static_cast<std::size_t>(third);
-    const double above = half_sample_mode(upper);
-    const double below = half_sample_mode(lower);
+    const double above = mode(upper, rod.tolerance_mm());
+    const double below = mode(lower, rod.tolerance_mm());
     said.half_width_mm[k] = 0.5 * (above + below);
     said.across_mm[k] = 0.5 * (above - below);
     said.across[k] = normal.normalized();
@@ -75,9 +74,15 @@ Testimony testimony(const CameraView& view, const RodConsensus& rod) {
 /// An oval shows widths this many times further apart than a camera in the wrong place shows its axis.
 constexpr double kOvalAllowance = 0.4;
 
+/// The middle one of the thirds: scale or a beam may spoil one third of a camera, a wrong pose spoils two or all.
+double middle(std::array<double, kThirds> misfits) {
+  std::sort(misfits.begin(), misfits.end());
+  return misfits[kThirds / 2];
+}
+
 /// How far the widths seen by different cameras lie apart, allowing for an oval.
 double width_misfit(std::span<const Testimony> all) {
-  double widest = 0.0;
+  std::array<double, kThirds> apart{};
   for (std::size_t t = 0; t < kThirds; ++t) {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
@@ -86,14 +91,14 @@ double width_misfit(std::span<const Testimony> all) {
       low = std::min(low, said.half_width_mm[t]);
       high = std::max(high, said.half_width_mm[t]);
     }
-    if (high > low) widest = std::max(widest, kOvalAllowance * 2.0 * (high - low));
+    if (high > low) apart[t] = kOvalAllowance * 2.0 * (high - low);
   }
-  return widest;
+  return middle(apart);
 }
 
 /// How far one camera must be wrong about the axis' place at least, or 0 with fewer than three.
 double place_misfit(std::span<const Testimony> all) {
-  double worst = 0.0;
+  std::array<double, kThirds> wrong{};
   for (std::size_t t = 0; t < kThirds; ++t) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -117,9 +122,9 @@ double place_misfit(std::span<const Testimony> all) {
       most = std::max(most, residual);
     }
     // Three lines that do not meet: any one may be wrong, so count the smallest fault that explains it.
-    if (std::isfinite(least)) worst = std::max(worst, present.size() == 3 ? least : most);
+    if (std::isfinite(least)) wrong[t] = present.size() == 3 ? least : most;
   }
-  return worst;
+  return middle(wrong);
 }
 
 double end_misfit(std::span<const Testimony> all) {

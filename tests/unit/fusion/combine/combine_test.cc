@@ -188,6 +188,30 @@ void displace_stretch(Imprint& imprint, double weight) {
   }
 }
 
+/// Dark scale over the rim: runs of 10 to 80 stations, `share` of each rim, lie a ragged 3 to 30 px inside.
+void cover_with_scale(Imprint& imprint, double share, std::mt19937& generator) {
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  for (const bool upper : {true, false}) {
+    ImprintCurve& rim = upper ? imprint.upper : imprint.lower;
+    std::vector<char> covered(kImprintStations, 0);
+    std::size_t count = 0;
+    while (static_cast<double>(count) < share * kImprintStations) {
+      const auto first = static_cast<std::size_t>(uniform(generator) * kImprintStations);
+      const auto run = static_cast<std::size_t>(10.0 + 70.0 * uniform(generator));
+      double depth_px = 3.0 + 27.0 * uniform(generator);
+      for (std::size_t i = first; i < std::min(first + run, kImprintStations); ++i) {
+        depth_px = std::clamp(depth_px + 4.0 * (uniform(generator) - 0.5), 3.0, 30.0);
+        if (covered[i]) continue;
+        covered[i] = 1;
+        ++count;
+        rim.offset_px[i] += upper ? depth_px : -depth_px;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < kImprintStations; ++i)
+    imprint.axis.offset_px[i] = 0.5 * (imprint.upper.offset_px[i] + imprint.lower.offset_px[i]);
+}
+
 }  // namespace
 
 TEST_CASE("combine: exact views of a round, bent, stepped rod give axis and diameter to 0.01 mm, length to 0.05 mm") {
@@ -304,6 +328,20 @@ TEST_CASE("combine: a rim stretch 4 px off hardly moves the axis, less still wit
   CHECK(with_low.axis_max < before.axis_max + 0.2);
   CHECK(with_full.axis_max < before.axis_max + 0.8);
   CHECK(with_full.axis_rms < before.axis_rms + 0.2);
+}
+
+TEST_CASE("combine: scale over 30 % of every rim leaves 0.5 mm of axis and 0.5 mm of diameter") {
+  const Rod rod = stepped_rod();
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    Session session = observe(rod, {.noise_px = 0.1, .seed = seed});
+    std::mt19937 generator(100 + seed);
+    for (Imprint& imprint : session.imprints[0]) cover_with_scale(imprint, 0.3, generator);
+    const Deviation d = measured_deviation(rod, session);
+    INFO(text(d));
+    CHECK(d.axis_rms < 0.5);
+    CHECK(d.diameter_best90_rms < 0.5);
+    CHECK(std::abs(d.length) < 1.5);
+  }
 }
 
 TEST_CASE("combine: the 95 % intervals cover the truth of one observation in 90 to 100 % of the sections") {
