@@ -12,6 +12,9 @@
 namespace imprint {
 namespace {
 
+/// In tolerances of the rod all agree on: a rim point this far off is not asked again.
+constexpr double kNeverShare = 2.0;
+
 CameraShare share_of(const Imprint& imprint) {
   CameraShare share;
   share.id = imprint.camera_id;
@@ -46,6 +49,8 @@ std::vector<ObservedSection> sections_of(const RodConsensus& rod, std::span<cons
     // Beyond the ends the outline follows the end circle, not the rim.
     const double s = tangent.contact.x_mm - ends.first.x_mm;
     if (s < 0.0 || s > length) continue;
+    const double deviation = std::abs(rod.deviation_mm(tangent.contact));
+    if (deviation > kNeverShare * rod.tolerance_mm()) continue;
     const auto nearest = static_cast<std::size_t>(std::clamp<long>(std::lround(s / step), 0, count - 1));
     sections[nearest].tangents.push_back({.normal_world = tangent.contact.normal,
                                           .offset_mm = tangent.contact.offset_mm,
@@ -53,7 +58,7 @@ std::vector<ObservedSection> sections_of(const RodConsensus& rod, std::span<cons
                                           .weight = tangent.weight,
                                           .camera = views[tangent.view].camera,
                                           .upper = tangent.upper,
-                                          .stray = std::abs(rod.deviation_mm(tangent.contact)) > rod.tolerance_mm(),
+                                          .stray = deviation > rod.tolerance_mm(),
                                           .s_mm = s,
                                           .ray_world = tangent.ray});
   }
