@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
 #include "lib/log/log.h"
 
@@ -17,11 +18,6 @@ constexpr std::size_t kTriggerHistory = 16;
 constexpr std::size_t kPublishedSessions = 16;  // whose last result a late watcher still gets
 constexpr auto kIdleWait = std::chrono::seconds(1);
 constexpr auto kRetryWait = std::chrono::milliseconds(500);
-
-std::int64_t wall_clock_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 std::string parameter(std::string_view parameters, std::string_view name) {
   while (!parameters.empty()) {
@@ -273,6 +269,8 @@ void FusionService::make_result(const std::string& session) {
     if (measurement) {
       const auto warnings = assembler_.warnings(session);
       measurement->warnings.insert(measurement->warnings.end(), warnings.begin(), warnings.end());
+      measurement->line = config_.site + "/" + config_.line;
+      measurement->made_at = utc_text(result.made_ns);
       result.json = to_json(*measurement).dump();
     } else {
       result.error = measurement.error().message;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lib/clock/wall_clock.h"
 #include "lib/log/log.h"
 #include "lib/wire/keys.h"
 
@@ -9,7 +10,6 @@ namespace imprint {
 namespace {
 
 using std::chrono::steady_clock;
-using std::chrono::system_clock;
 
 constexpr std::size_t kMaxQueuedTriggers = 64;
 constexpr std::size_t kMaxTriggerBytes = 4096;
@@ -19,8 +19,6 @@ constexpr auto kMaxLead = std::chrono::seconds(60);  // a moment further ahead m
 std::int64_t nanoseconds(auto duration) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count();
 }
-
-std::int64_t wall_clock_ns() { return nanoseconds(system_clock::now().time_since_epoch()); }
 
 }  // namespace
 

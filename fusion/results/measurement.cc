@@ -129,6 +129,8 @@ nlohmann::json to_json(const Measurement& measurement) {
   json["schema"] = kSchema;
   json["session"] = measurement.session;
   json["method"] = measurement.method;
+  if (!measurement.line.empty()) json["line"] = measurement.line;
+  if (!measurement.made_at.empty()) json["made_at"] = measurement.made_at;
   json["length_mm"] = measurement.length_mm;
   json["length_ci95_mm"] = measurement.length_ci95_mm;
   json["max_deflection_mm"] = measurement.max_deflection_mm;
@@ -156,6 +158,8 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     Measurement measurement;
     measurement.session = json.value("session", "");
     measurement.method = json.at("method").get<std::string>();
+    measurement.line = json.value("line", "");
+    measurement.made_at = json.value("made_at", "");
     measurement.length_mm = json.at("length_mm").get<double>();
     measurement.length_ci95_mm = json.value("length_ci95_mm", 0.0);
     measurement.max_deflection_mm = json.at("max_deflection_mm").get<double>();

@@ -1,8 +1,8 @@
 #include "fusion/serve/line_board.h"
 
-#include <ctime>
+#include <fmt/core.h>
 
-#include <fmt/chrono.h>
+#include "lib/clock/wall_clock.h"
 
 namespace imprint {
 namespace {
@@ -47,20 +47,6 @@ json imprint_json(const Imprint& imprint, double age) {
 }
 
 }  // namespace
-
-std::string utc_text(std::int64_t time_ns) {
-  const std::int64_t second_ns = 1'000'000'000;
-  std::int64_t seconds = time_ns / second_ns;
-  std::int64_t rest_ns = time_ns % second_ns;
-  if (rest_ns < 0) {
-    rest_ns += second_ns;
-    --seconds;
-  }
-  const std::time_t whole = seconds;
-  std::tm utc{};
-  gmtime_r(&whole, &utc);
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", utc, rest_ns / 1'000'000);
-}
 
 json to_json(const StoredResult& result) {
   json document = {{"schema", "imprint.session_result/1"},

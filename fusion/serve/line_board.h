@@ -17,9 +17,6 @@
 
 namespace imprint {
 
-/// Time since the Unix epoch as people and programs read it: "2026-11-22T18:05:02.123Z".
-std::string utc_text(std::int64_t time_ns);
-
 /// `imprint.session_result/1`: a stored result with its measurement (`imprint.result/1`, or null) in `result`.
 nlohmann::json to_json(const StoredResult& result);
 nlohmann::json to_json(const SessionSummary& summary);

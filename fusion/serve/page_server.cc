@@ -5,6 +5,7 @@
 
 #include <httplib.h>
 
+#include "fusion/report/result_plots.h"
 #include "fusion/serve/page.h"
 
 namespace imprint {
@@ -88,6 +89,10 @@ class HttpPageServer final : public PageServer {
                   const std::string session = request.matches[1];
                   answer_result(response, store_.result(session), "no result of session " + session);
                 });
+    server_.Get(R"(/api/plots/([A-Za-z0-9_.\-]{1,64}))",
+                [this](const httplib::Request& request, httplib::Response& response) {
+                  answer_plots(response, request.matches[1]);
+                });
     server_.Get("/healthz", [this](const httplib::Request&, httplib::Response& response) {
       const bool healthy = !board_.has_alarm();
       answer_json(response, {{"healthy", healthy}}, healthy ? 200 : 503);
@@ -107,6 +112,20 @@ class HttpPageServer final : public PageServer {
     if (!result) return answer_error(response, 503, result.error().message);
     if (!result->has_value()) return answer_error(response, 404, absent);
     answer_json(response, to_json(**result));
+  }
+
+  void answer_plots(httplib::Response& response, const std::string& session) {
+    const auto stored = store_.result(session);
+    if (!stored) return answer_error(response, 503, stored.error().message);
+    if (!stored->has_value() || (*stored)->json.empty()) return answer_error(response, 404, "no result of " + session);
+    const auto measurement = measurement_from_json(json::parse((*stored)->json, nullptr, false));
+    if (!measurement) return answer_error(response, 500, measurement.error().message);
+    const ResultPlots plots = draw_result(*measurement);
+    answer_json(response, {{"axis_xy", plots.axis_xy},
+                           {"axis_xz", plots.axis_xz},
+                           {"diameter", plots.diameter},
+                           {"circularity", plots.circularity},
+                           {"direction", plots.direction}});
   }
 
   const LineBoard& board_;

@@ -52,6 +52,23 @@ TEST_CASE("page: the API gives the status, the sessions and each result") {
   REQUIRE(server.json("/api/result/S-1")["result"]["length_mm"] == 1500.5);
 }
 
+TEST_CASE("page: the pictures of a result come drawn; none for a session without one") {
+  const Server server;
+  Measurement measurement;
+  for (int i = 0; i < 3; ++i) {
+    const double s = 10.0 * i;
+    measurement.sections.push_back({s, {s, 0.1, 0.2}, 0.22, 200.0, 1.0, 0.1, 0.1, 0.1});
+  }
+  REQUIRE(server.store->put_result({"S-2", true, "", to_json(measurement).dump(), 0, 0}));
+  const auto plots = server.json("/api/plots/S-2");
+  for (const char* name : {"axis_xy", "axis_xz", "diameter", "circularity", "direction"}) {
+    CAPTURE(name);
+    REQUIRE(plots[name].get<std::string>().starts_with("<svg"));
+  }
+  REQUIRE(server.get("/api/plots/another").first == 404);
+  REQUIRE(server.get("/api/plots/S-1").first == 500);  // stored, but no whole result
+}
+
 TEST_CASE("page: what is not there is 404, whatever the path says") {
   const Server server;
   REQUIRE(server.get("/api/result/another").first == 404);
