@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/result_table.h"
 #include "fusion/fusion_pipeline.h"
+#include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
 #include "lib/wire/wire.h"
 #include "node/capture/image_file.h"
@@ -82,7 +83,9 @@ Result<Measurement> measure(const MeasureOptions& options) {
     if (!observation) return pass_on(observation.error());
     observations.push_back(std::move(*observation));
   }
-  return fuse(observations, rig->forging, options.session.stem().string(), options.method);
+  auto measurement = fuse(observations, rig->forging, options.session.stem().string(), options.method);
+  if (measurement) measurement->made_at = utc_text(wall_clock_ns());
+  return measurement;
 }
 
 int run_measure(const MeasureOptions& options, bool json) {

@@ -73,6 +73,14 @@ TruthComparison compare(const Measurement& measurement, const nlohmann::json& tr
     axis_ci.push_back(section.axis_ci95_mm);
     diameter_ci.push_back(section.diameter_ci95_mm);
     circularity_ci.push_back(section.circularity_ci95_mm);
+    result.sections.push_back({.s_mm = section.s_mm,
+                               .axis_mm = {section.s_mm, at.y_mm, at.z_mm},
+                               .deflection_mm = std::hypot(at.y_mm, at.z_mm),
+                               .diameter_mm = at.diameter_mm,
+                               .circularity_mm = at.circularity_mm,
+                               .axis_ci95_mm = 0.0,
+                               .diameter_ci95_mm = 0.0,
+                               .circularity_ci95_mm = 0.0});
   }
   result.axis_rms_mm = rms(axis);
   result.axis_max_mm = *std::max_element(axis.begin(), axis.end());

@@ -19,7 +19,8 @@ struct TruthComparison {
   double diameter_rms_mm = 0.0;
   double diameter_rms_best90_mm = 0.0;  ///< the largest 10 % of the errors left out, as in [D] table 3
   double circularity_rms_mm = 0.0;
-  double axis_covered = 0.0;  ///< share of the sections whose 95 % interval holds the truth
+  std::vector<Measurement::Section> sections;  ///< the truth at each measured s; no intervals
+  double axis_covered = 0.0;                   ///< share of the sections whose 95 % interval holds the truth
   double diameter_covered = 0.0;
   double circularity_covered = 0.0;
 };

@@ -133,7 +133,7 @@ def main():
         result = plant.measure(name, rotations)
         result_file = source / "result.json"
         result_file.write_text(json.dumps(json.loads(result), indent=1) + "\n", encoding="utf-8")
-        report_file = source / "report.txt"
+        report_file = source / "report.html"
         arguments = ["report", result_file, "--out", report_file]
         if (source / "truth.json").is_file():
             arguments += ["--truth", source / "truth.json"]
@@ -141,7 +141,7 @@ def main():
         if report.returncode:
             fail(report.stderr.strip())
         print(report.stdout, end="")
-        print(f"Result: {result_file}\nReport: {report_file}\nLogs:   {source}/*.log")
+        print(f"Result: {result_file}\nReport: {report_file} (to read and print in any browser)\nLogs:   {source}/*.log")
         if options.hold:
             input(f"The page is up at {plant.page} - press Enter to stop ")
     print("All processes stopped.")
