@@ -116,7 +116,8 @@ std::string sections(const Measurement& m) {
   for (std::size_t i = 0; i < listed; ++i)
     rows += section_row(m.sections[listed > 1 ? (i * last + (listed - 1) / 2) / (listed - 1) : 0]);
   return fmt::format(
-      "<h2 class=\"sheet\">Sections</h2>\n<p class=\"note\">{} of {} sections, mm; all are in the document embedded in this page.</p>\n"
+      "<h2 class=\"sheet\">Sections</h2>\n<p class=\"note\">{} of {} sections, mm; all are in the document embedded in "
+      "this page.</p>\n"
       "<table id=\"sections\" class=\"sections\"><thead><tr><th class=\"number\">x</th><th class=\"number\">y</th>"
       "<th class=\"number\">z</th><th class=\"number\">deflection</th><th class=\"number\">±</th>"
       "<th class=\"number\">diameter</th><th class=\"number\">±</th><th class=\"number\">circularity</th>"

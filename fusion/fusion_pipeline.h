@@ -13,7 +13,7 @@ namespace imprint {
 /// The whole fusion: triangulate every observation, combine, evaluate. A pure call.
 /// A camera with a failure or missing is excluded and named in the warnings; fails (job_failed)
 /// only when no observation has two usable cameras.
-Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging,
-                         std::string session, std::string method);
+Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
+                         std::string method);
 
 }  // namespace imprint

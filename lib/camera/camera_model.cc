@@ -15,7 +15,8 @@ struct Normalized {
 Normalized distort_normalized(const BalancedDistortion& d, Normalized p) {
   const double q = d.r0 * d.r0;
   const double r2 = p.u * p.u + p.v * p.v;
-  const double radial = d.radial[0] * (r2 - q) + d.radial[1] * (r2 * r2 - q * q) + d.radial[2] * (r2 * r2 * r2 - q * q * q);
+  const double radial =
+      d.radial[0] * (r2 - q) + d.radial[1] * (r2 * r2 - q * q) + d.radial[2] * (r2 * r2 * r2 - q * q * q);
   const double b1 = d.tangential[0], b2 = d.tangential[1], c1 = d.affine[0], c2 = d.affine[1];
   return {p.u + p.u * radial + b1 * (r2 + 2 * p.u * p.u) + 2 * b2 * p.u * p.v + c1 * p.u + c2 * p.v,
           p.v + p.v * radial + b2 * (r2 + 2 * p.v * p.v) + 2 * b1 * p.u * p.v};
@@ -24,7 +25,8 @@ Normalized distort_normalized(const BalancedDistortion& d, Normalized p) {
 Eigen::Matrix2d jacobian_normalized(const BalancedDistortion& d, Normalized p) {
   const double q = d.r0 * d.r0;
   const double r2 = p.u * p.u + p.v * p.v;
-  const double radial = d.radial[0] * (r2 - q) + d.radial[1] * (r2 * r2 - q * q) + d.radial[2] * (r2 * r2 * r2 - q * q * q);
+  const double radial =
+      d.radial[0] * (r2 - q) + d.radial[1] * (r2 * r2 - q * q) + d.radial[2] * (r2 * r2 * r2 - q * q * q);
   const double slope = d.radial[0] + 2 * d.radial[1] * r2 + 3 * d.radial[2] * r2 * r2;  // d(radial)/d(r^2)
   const double b1 = d.tangential[0], b2 = d.tangential[1];
   Eigen::Matrix2d j;

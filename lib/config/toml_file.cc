@@ -35,7 +35,9 @@ void TomlReader::fault(std::string_view key, std::string_view message) {
   const toml::node* node = find(key);
   const auto line = node != nullptr ? node->source().begin.line : table_.source().begin.line;
   const bool from_command_line = node != nullptr && node->source().path && *node->source().path == kOverrideSource;
-  const std::string place = from_command_line ? std::string(kOverrideSource) : line > 0 ? fmt::format("{}:{}", path_.string(), line) : path_.string();
+  const std::string place = from_command_line ? std::string(kOverrideSource)
+                            : line > 0        ? fmt::format("{}:{}", path_.string(), line)
+                                              : path_.string();
   error_ = Error{ErrorKind::invalid_input, fmt::format("{}: {}{}: {}", place, prefix_, key, message)};
 }
 

@@ -30,9 +30,11 @@ class TomlReader {
   std::int64_t integer(std::string_view key, std::optional<std::int64_t> fallback = std::nullopt);
   bool boolean(std::string_view key, std::optional<bool> fallback = std::nullopt);
   /// `count` numbers; 0 takes any count.
-  std::vector<double> numbers(std::string_view key, std::size_t count, std::optional<std::vector<double>> fallback = std::nullopt);
+  std::vector<double> numbers(std::string_view key, std::size_t count,
+                              std::optional<std::vector<double>> fallback = std::nullopt);
   /// A list of texts.
-  std::vector<std::string> strings(std::string_view key, std::optional<std::vector<std::string>> fallback = std::nullopt);
+  std::vector<std::string> strings(std::string_view key,
+                                   std::optional<std::vector<std::string>> fallback = std::nullopt);
   /// A path, made absolute against the file's folder.
   std::filesystem::path path(std::string_view key, std::optional<std::filesystem::path> fallback = std::nullopt);
   /// The tables of an array of tables (`[[camera]]`); empty when the key is absent.

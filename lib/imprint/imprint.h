@@ -37,7 +37,7 @@ struct ImprintEnd {
   double station_px = 0.0;  ///< along the grid's line, same origin as the stations
   double offset_px = 0.0;   ///< where across it was read (near the axis)
   double sigma_px = 0.0;
-  bool visible = false;     ///< false: out of view, covered or not found
+  bool visible = false;  ///< false: out of view, covered or not found
 };
 
 /// What was seen of the frame, for the operator and for health.
@@ -45,10 +45,10 @@ struct FrameQuality {
   int targets_seen = 0;
   int targets_used = 0;
   double reprojection_rms_px = 0.0;
-  int edge_points = 0;             ///< edge points found before filtering, both rims
-  double edge_coverage = 0.0;      ///< share of the stations with both rims trusted, 0 to 1
-  double contrast = 0.0;           ///< median step across the rims, share of full scale
-  double saturated_fraction = 0.0; ///< share of saturated pixels inside the forging
+  int edge_points = 0;              ///< edge points found before filtering, both rims
+  double edge_coverage = 0.0;       ///< share of the stations with both rims trusted, 0 to 1
+  double contrast = 0.0;            ///< median step across the rims, share of full scale
+  double saturated_fraction = 0.0;  ///< share of saturated pixels inside the forging
 };
 
 /// Number of stations of a curve, [D] 2.1.2.
@@ -60,9 +60,9 @@ struct Imprint {
   std::string session;
   std::uint32_t observation = 0;
   double rotation_deg = 0.0;
-  std::uint64_t boot_id = 0;         ///< changes with every start of the node
-  std::uint64_t sequence = 0;        ///< counts the node's imprints from 1
-  std::int64_t sensor_time_ns = 0;   ///< since the Unix epoch
+  std::uint64_t boot_id = 0;        ///< changes with every start of the node
+  std::uint64_t sequence = 0;       ///< counts the node's imprints from 1
+  std::int64_t sensor_time_ns = 0;  ///< since the Unix epoch
   double focal_length_px = 0.0;
   CameraPose pose;
   StationGrid grid;

@@ -38,7 +38,9 @@ std::string Keys::service(std::string_view camera_id, std::string_view name) con
 }
 std::string Keys::trigger() const { return root_ + "/trigger"; }
 std::string Keys::result(std::string_view session) const { return fmt::format("{}/result/{}", root_, session); }
-std::string Keys::fusion_service(std::string_view name) const { return fmt::format("{}/fusion/service/{}", root_, name); }
+std::string Keys::fusion_service(std::string_view name) const {
+  return fmt::format("{}/fusion/service/{}", root_, name);
+}
 std::string Keys::fusion_alive() const { return root_ + "/fusion/alive"; }
 std::string Keys::everything() const { return root_ + "/**"; }
 

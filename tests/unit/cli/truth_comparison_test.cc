@@ -12,10 +12,14 @@ namespace {
 
 // A straight true cylinder of 1000 mm, 200 mm thick, 2 mm out of round.
 nlohmann::json true_cylinder() {
-  nlohmann::json truth = {{"schema", "imprint.truth/1"}, {"length_mm", 1000.0}, {"max_deflection_mm", 0.0}, {"sections", nlohmann::json::array()}};
+  nlohmann::json truth = {{"schema", "imprint.truth/1"},
+                          {"length_mm", 1000.0},
+                          {"max_deflection_mm", 0.0},
+                          {"sections", nlohmann::json::array()}};
   for (int i = 0; i <= 100; ++i) {
     const double s = 10.0 * i;
-    truth["sections"].push_back({{"s_mm", s}, {"axis_mm", {s, 0.0, 0.0}}, {"diameter_mm", 200.0 + 0.01 * s}, {"circularity_mm", 2.0}});
+    truth["sections"].push_back(
+        {{"s_mm", s}, {"axis_mm", {s, 0.0, 0.0}}, {"diameter_mm", 200.0 + 0.01 * s}, {"circularity_mm", 2.0}});
   }
   return truth;
 }
@@ -61,7 +65,8 @@ TEST_CASE("truth comparison: a file that is no truth is refused by name") {
   const auto measurement = measured_with(0.0, 0.0, 0);
   CHECK_THAT(compare_with_truth(measurement, folder / "none.json").error().message, Contains("none.json"));
   CHECK_THAT(compare_with_truth(measurement, folder.write("a.json", "{")).error().message, Contains("a.json"));
-  CHECK_THAT(compare_with_truth(measurement, folder.write("b.json", "{\"schema\": \"other\"}")).error().message, Contains("b.json"));
+  CHECK_THAT(compare_with_truth(measurement, folder.write("b.json", "{\"schema\": \"other\"}")).error().message,
+             Contains("b.json"));
 }
 
 TEST_CASE("result table: shows measured, truth and error of the length") {
