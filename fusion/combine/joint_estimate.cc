@@ -16,6 +16,7 @@ namespace {
 constexpr int kCameraUnknowns = 2;    // its place across the axis, at both ends
 constexpr int kPlaceUnknowns = 6;     // shift x, y, z and turn about x, y, z of an observation
 constexpr double kFreedom = 4.0;      // of Student's t for the tangents
+constexpr double kStartShare = 0.05;  // sigma of the start's radius, of the radius
 constexpr double kPlaceShare = 0.02;  // variance of a station's place along x, in squared steps between nodes
 
 /// One camera of one observation.
@@ -81,6 +82,7 @@ class JointSolver {
       const bool step = *high - *low > 0.02 * *high;
       radius_range_.emplace_back(step ? *low : start_radius_mm[i], step ? *high : start_radius_mm[i]);
     }
+    start_ = nodes_;
     collect_rows(observations);
     std::vector<double> out_of_round;
     for (const ObservedForging& observed : observations) out_of_round.push_back(observed.out_of_round_mm);
@@ -266,12 +268,24 @@ class JointSolver {
     }
   }
 
+  /// The start's radius, as far as it can be wrong: a stretch that few rims show must not wander off with the wrong ones.
+  void add_start() {
+    const double information = 1.0 / std::pow(kStartShare * radius_mm_, 2);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      const auto& [low, high] = radius_range_[i];
+      if (low < high) continue;  // a shoulder may lie beside where the start has it
+      system_.diagonal[i](kRadius, kRadius) += information;
+      system_.right[i](kRadius) += information * start_[i](kRadius);
+    }
+  }
+
   /// The equations of this round, solved; false when they cannot be.
   bool solve(SectionPrior::Use use, std::vector<std::optional<Equation>>& equations) {
     const int border =
         static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
     system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
     prior_.add_to(system_, use);
+    if (use == SectionPrior::Use::estimate) add_start();
     add_camera_priors();
     add_place_priors();
     const RodSurface rod(nodes_, step_mm_);
@@ -429,7 +443,7 @@ class JointSolver {
   BorderedSystem system_;
   std::vector<Viewer> viewers_;
   std::vector<Row> rows_;
-  std::vector<NodeVector> nodes_;
+  std::vector<NodeVector> nodes_, start_;
   std::vector<NodeMatrix> own_, with_next_;
   std::vector<std::pair<double, double>> radius_range_;  ///< about each node, of the start
   std::vector<Vector6d> place_sum_;
