@@ -225,6 +225,16 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
     section.diameter_sigma_mm *= config.interval_widening;
     section.circularity_sigma_mm *= config.interval_widening;
   }
+  const auto beyond = std::count_if(combined.sections.begin(), combined.sections.end(), [&](const auto& section) {
+    return section.diameter_mm < 0.9 * forging.diameter_min_mm || section.diameter_mm > 1.1 * forging.diameter_max_mm;
+  });
+  if (2 * beyond > static_cast<long>(combined.sections.size()))
+    return job_failed(
+        "{} of {} sections lie outside the rig's diameters of {:.0f} to {:.0f} mm: nothing of this can be believed",
+        beyond, combined.sections.size(), forging.diameter_min_mm, forging.diameter_max_mm);
+  if (beyond > 0)
+    combined.warnings.push_back(fmt::format("{} sections lie outside the rig's diameters of {:.0f} to {:.0f} mm",
+                                            beyond, forging.diameter_min_mm, forging.diameter_max_mm));
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const double own = (observations[k].end_world_mm - observations[k].start_world_mm).norm();
     if (std::abs(own - combined.length_mm) > config.max_length_difference_mm)

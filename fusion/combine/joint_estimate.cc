@@ -78,7 +78,8 @@ class JointSolver {
     constexpr std::size_t kReach = 3;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const auto near = start_radius_mm.subspan(i < kReach ? 0 : i - kReach);
-      const auto [low, high] = std::minmax_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(std::min(near.size(), 2 * kReach + 2)));
+      const auto [low, high] = std::minmax_element(
+          near.begin(), near.begin() + static_cast<std::ptrdiff_t>(std::min(near.size(), 2 * kReach + 2)));
       const bool step = *high - *low > 0.02 * *high;
       radius_range_.emplace_back(step ? *low : start_radius_mm[i], step ? *high : start_radius_mm[i]);
     }
@@ -128,7 +129,8 @@ class JointSolver {
     for (const ObservedForging& observed : observations)
       for (const ObservedSection& section : observed.sections)
         for (const TangentPlane& tangent : section.tangents)
-          if (!tangent.stray) seen[static_cast<std::size_t>(std::clamp(std::lround(tangent.s_mm / step_mm), 0L, last))] = 1;
+          if (!tangent.stray)
+            seen[static_cast<std::size_t>(std::clamp(std::lround(tangent.s_mm / step_mm), 0L, last))] = 1;
     constexpr long kShortest = 4;  // nodes of a stretch nobody sees
     constexpr long kBeyond = 4;    // nodes on to where the radius is even again
     std::vector<double> steps(radius_mm.size() - 1, 0.0);
@@ -268,7 +270,8 @@ class JointSolver {
     }
   }
 
-  /// The start's radius, as far as it can be wrong: a stretch that few rims show must not wander off with the wrong ones.
+  /// The start's radius, as far as it can be wrong: a stretch that few rims show must not wander off with the wrong
+  /// ones.
   void add_start() {
     const double information = 1.0 / std::pow(kStartShare * radius_mm_, 2);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -364,7 +367,8 @@ class JointSolver {
       if (viewer.observation > 0)
         model += equation.place.dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
       row.residual_mm = equation.value_mm - model;
-      row.from_circle_mm = row.residual_mm + equation.coefficients.tail<2 * kHarmonics>().dot(node.tail<2 * kHarmonics>());
+      row.from_circle_mm =
+          row.residual_mm + equation.coefficients.tail<2 * kHarmonics>().dot(node.tail<2 * kHarmonics>());
     }
   }
 
@@ -380,12 +384,16 @@ class JointSolver {
   }
 
   /// What lies far out of what the rod is out of round belongs to something else (Tukey's biweight). Next to a step
-  /// any radius from the one to the other is on the rod.
+  /// any radius from the one to the other is on the rod. Of several observations none is silenced for contradicting
+  /// the others: one that was turned wrongly has to show.
   double belongs(const Row& row, const Equation& equation) const {
+    if (placements_.size() > 1) return 1.0;
     const double radius = (1.0 - equation.share) * nodes_[equation.node](kRadius) +
                           equation.share * nodes_[equation.node + 1](kRadius) + row.from_circle_mm;
     const auto [low, high] = radius_range_[equation.node];
-    const double off = row.from_circle_mm - std::clamp(row.from_circle_mm, std::min(0.0, low - radius + row.from_circle_mm), std::max(0.0, high - radius + row.from_circle_mm));
+    const double off =
+        row.from_circle_mm - std::clamp(row.from_circle_mm, std::min(0.0, low - radius + row.from_circle_mm),
+                                        std::max(0.0, high - radius + row.from_circle_mm));
     const double z = off / (4.685 * out_of_round_mm_);
     return std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
   }

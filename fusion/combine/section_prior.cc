@@ -94,15 +94,14 @@ void SectionPrior::add_to(BorderedSystem& system, Use use) const {
 }
 
 void SectionPrior::learn(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                         std::span<const NodeMatrix> with_next, int observations,
-                         double out_of_round_mm) {
+                         std::span<const NodeMatrix> with_next, int observations, double out_of_round_mm) {
   learn_harmonics(nodes, own, observations, out_of_round_mm);
   learn_axis(nodes, own, with_next);
   learn_radius(nodes, own, with_next);
 }
 
-void SectionPrior::learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
-                                   int observations, double out_of_round_mm) {
+void SectionPrior::learn_harmonics(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own, int observations,
+                                   double out_of_round_mm) {
   const std::size_t n = nodes.size();
   std::array<Amount, kHarmonics> amounts{};
   for (int order = kFirstHarmonic; order <= kLastHarmonic; ++order) {

@@ -59,8 +59,8 @@ class SectionPrior {
   double length_mm_;
   std::array<double, kHarmonics> harmonic_sigma_mm_{};
   double harmonic_length_mm_;
-  double bend_density_;               ///< variance of the slope gained per mm
-  double radius_density_;             ///< mm^2 of variance of the radius per mm
+  double bend_density_;    ///< variance of the slope gained per mm
+  double radius_density_;  ///< mm^2 of variance of the radius per mm
   std::vector<double> unseen_step_mm_;
   std::vector<double> radius_trust_;  ///< of each step between nodes: near 0 at a shoulder
 };

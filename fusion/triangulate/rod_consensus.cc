@@ -77,7 +77,8 @@ class RadiusPath {
     for (std::size_t i = 1; i < n; ++i) {
       Eigen::Index top = 0;
       const double stepped = total.maxCoeff(&top) - kStepCost;
-      for (int level = 0; level < kLevels; ++level) from[i][static_cast<std::size_t>(level)] = static_cast<std::int16_t>(level);
+      for (int level = 0; level < kLevels; ++level)
+        from[i][static_cast<std::size_t>(level)] = static_cast<std::int16_t>(level);
       // Two sweeps carry every total to its neighbours for the price of the levels between.
       const auto carry = [&](int level, int neighbour) {
         if (total(neighbour) - kLevelCost <= total(level)) return;
@@ -208,8 +209,8 @@ double RodConsensus::tolerance_mm() const { return std::max(4.0 * scatter_mm, 0.
 double RodConsensus::median_radius_mm(double from_x_mm, double to_x_mm) const {
   const std::size_t first = sample_of(axis, from_x_mm);
   const std::size_t last = std::max(sample_of(axis, to_x_mm), first) + 1;
-  return median({radius_mm.begin() + static_cast<std::ptrdiff_t>(first),
-                 radius_mm.begin() + static_cast<std::ptrdiff_t>(last)});
+  return median(
+      {radius_mm.begin() + static_cast<std::ptrdiff_t>(first), radius_mm.begin() + static_cast<std::ptrdiff_t>(last)});
 }
 
 RodConsensus agree_on_rod(std::span<const CameraView> views, AxisCurve start, const ForgingSpec& forging) {

@@ -30,7 +30,8 @@ struct RimStops {
 RimStops rim_stops(std::span<const CameraView> views, const RodConsensus& rod) {
   constexpr std::size_t kRun = 8;  // points of which most have to agree
   std::map<std::pair<std::size_t, bool>, std::vector<RimTangent>> rims;
-  for (const RimTangent& tangent : rim_tangents(views, rod.axis)) rims[{tangent.view, tangent.upper}].push_back(tangent);
+  for (const RimTangent& tangent : rim_tangents(views, rod.axis))
+    rims[{tangent.view, tangent.upper}].push_back(tangent);
   std::vector<double> first, last;
   for (auto& [name, rim] : rims) {
     std::sort(rim.begin(), rim.end(), [](const auto& a, const auto& b) { return a.contact.x_mm < b.contact.x_mm; });
@@ -83,9 +84,10 @@ std::vector<Candidate> candidates(std::span<const CameraView> views, const RodCo
     const double sigma =
         std::hypot(end.sigma_px * range / view.focal_length_px / across, 0.01 * radius * along_ray / across);
     const Eigen::Vector3d beside = axis.R_line * (met - axis.at(*x).point_mm);
-    found.push_back({.reading = {.camera = view.camera, .last = last, .ray_world = end.direction_world, .sigma_mm = sigma},
-                     .x_mm = *x,
-                     .beside_mm = beside.tail<2>()});
+    found.push_back(
+        {.reading = {.camera = view.camera, .last = last, .ray_world = end.direction_world, .sigma_mm = sigma},
+         .x_mm = *x,
+         .beside_mm = beside.tail<2>()});
   }
   std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.x_mm < b.x_mm; });
   return found;
@@ -125,10 +127,10 @@ RodEnds find_ends(std::span<const CameraView> views, const RodConsensus& rod, st
     // Rims that run on well past every reading: what was read is not the end.
     const auto past = [&](double x_mm) { return last ? stop - x_mm : x_mm - stop; };
     if (group.size() == 1 && past(group[0].x_mm) > 0.25 * radius) {
-      ends.warnings.push_back(fmt::format("camera {}: the {} end it reads lies {:.0f} mm inside where the rims stop; it "
-                                          "is not believed",
-                                          ids[static_cast<std::size_t>(group[0].reading.camera)], name,
-                                          past(group[0].x_mm)));
+      ends.warnings.push_back(
+          fmt::format("camera {}: the {} end it reads lies {:.0f} mm inside where the rims stop; it "
+                      "is not believed",
+                      ids[static_cast<std::size_t>(group[0].reading.camera)], name, past(group[0].x_mm)));
       continue;
     }
     double doubt = 0.0;
@@ -136,10 +138,11 @@ RodEnds find_ends(std::span<const CameraView> views, const RodConsensus& rod, st
       if (&one >= group.data() && &one < group.data() + group.size()) continue;
       const double off = one.x_mm - group[0].x_mm;
       if (group.size() == 1) doubt = std::max(doubt, std::abs(off));
-      ends.warnings.push_back(fmt::format("camera {}: the {} end it reads lies {:+.1f} mm from {}; it is not believed{}",
-                                          ids[static_cast<std::size_t>(one.reading.camera)], name, off,
-                                          group.size() == 1 ? "that of the other" : "that of the others",
-                                          group.size() == 1 ? ", and the interval is widened" : ""));
+      ends.warnings.push_back(
+          fmt::format("camera {}: the {} end it reads lies {:+.1f} mm from {}; it is not believed{}",
+                      ids[static_cast<std::size_t>(one.reading.camera)], name, off,
+                      group.size() == 1 ? "that of the other" : "that of the others",
+                      group.size() == 1 ? ", and the interval is widened" : ""));
     }
     for (Candidate& one : group) {
       one.reading.sigma_mm = std::hypot(one.reading.sigma_mm, doubt);

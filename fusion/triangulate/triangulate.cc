@@ -75,7 +75,6 @@ Result<void> TriangulateConfig::validate() const {
     return invalid_input("triangulate.min_view_angle_deg: between 0 and 90 expected, found {}", min_view_angle_deg);
   if (!(max_ray_distance_share > 0.0) || !(max_disagreement_share > 0.0) || !(min_rim_share > 0.0))
     return invalid_input("triangulate: shares above 0 expected");
-  if (axis_window < 3) return invalid_input("triangulate.axis_window: at least 3 expected, found {}", axis_window);
   return {};
 }
 
@@ -123,8 +122,7 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
     const double length = ends.planes.last.x_mm - ends.planes.first.x_mm;
     if (!(length > rod.median_radius_mm(ends.planes.first.x_mm, ends.planes.last.x_mm)))
       return job_failed("the ends seen by the cameras lie {:.1f} mm apart, which is no rod", length);
-    rod = agree_on_rod(agreeing->views, over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm),
-                       forging);
+    rod = agree_on_rod(agreeing->views, over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm), forging);
     ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm);
   }
   observed.warnings.insert(observed.warnings.end(), ends.warnings.begin(), ends.warnings.end());

@@ -59,7 +59,7 @@ struct ObservedForging {
   Eigen::Vector3d start_world_mm = Eigen::Vector3d::Zero();  ///< axis point at the first end
   Eigen::Vector3d end_world_mm = Eigen::Vector3d::Zero();
   double length_sigma_mm = 0.0;
-  double radius_mm = 0.0;  ///< median of the sections
+  double radius_mm = 0.0;        ///< median of the sections
   double out_of_round_mm = 0.0;  ///< robust sigma of the tangents about the circles on which most rims agree
   std::vector<EndReading> ends;
   double disagreement_sigma_mm = 0.0;  ///< of a camera's place across the axis, where cameras contradict each other

@@ -12,9 +12,7 @@ struct TriangulateConfig {
       15.0;                     ///< widest angle between two cameras, seen from the axis, below which we refuse (ours)
   double min_rim_share = 0.05;  ///< share of a camera's rim points that must be usable (ours)
   double max_ray_distance_share = 0.25;  ///< of the largest diameter: limit of [D] equation 2 on the distance of rays
-  double stray_share = 0.04;             ///< a tangent further off than this, of the radius, is taken out (ours)
   double max_disagreement_share = 0.04;  ///< of the diameter: a camera this far from the others contradicts them (ours)
-  int axis_window = 41;                  ///< sections in the Savitzky-Golay window of the axis, [D] 2.1.2
 
   [[nodiscard]] Result<void> validate() const;
 };

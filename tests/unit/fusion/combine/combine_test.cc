@@ -288,7 +288,7 @@ TEST_CASE("combine: rotations count from the first observation, whatever its own
   CHECK(d.axis_rms < 0.02);
 }
 
-// Not reached yet since stray tangents are taken out before the estimate; see CHANGELOG.
+// Not reached yet; see CHANGELOG.
 TEST_CASE("combine: at laboratory scale a bow of 1 mm is found to 0.05 mm", "[!mayfail]") {
   Rod rod = bent_rod(1.0 / 7.0, 1.0);
   make_out_of_round(rod, 0.3, 50.0, 5);
@@ -365,7 +365,7 @@ TEST_CASE("combine: the 95 % intervals cover the truth of one observation in 90 
   CHECK(sum.length_in_ci > 0.80);
 }
 
-// Not reached yet since stray tangents are taken out before the estimate; see CHANGELOG.
+// Not reached yet; see CHANGELOG.
 TEST_CASE("combine: the 95 % intervals of three observations cover 90 to 100 % and are no wider than they must be", "[!mayfail]") {
   Deviation sum;
   constexpr int kRods = 4;
