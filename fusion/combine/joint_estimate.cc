@@ -13,11 +13,14 @@
 namespace imprint {
 namespace {
 
-constexpr int kCameraUnknowns = 2;    // its place across the axis, at both ends
-constexpr int kPlaceUnknowns = 6;     // shift x, y, z and turn about x, y, z of an observation
-constexpr double kFreedom = 4.0;      // of Student's t for the tangents
-constexpr double kStartShare = 0.05;  // sigma of the start's radius, of the radius
-constexpr double kPlaceShare = 0.02;  // variance of a station's place along x, in squared steps between nodes
+constexpr int kCameraUnknowns = 2;         // its place across the axis, at both ends
+constexpr int kPlaceUnknowns = 6;          // shift x, y, z and turn about x, y, z of an observation
+constexpr double kTogether = 3.0;          // tangents of a rim that haze and filtering move together
+constexpr double kLeastNoise = 0.2;        // of the stated sigma: exact input must not make the equations singular
+constexpr double kLeastOutOfRound = 7e-3;  // of the radius: what a forging may be before it counts as a fault
+constexpr double kFreedom = 4.0;           // of Student's t for the tangents
+constexpr double kStartShare = 0.05;       // sigma of the start's radius, of the radius
+constexpr double kPlaceShare = 0.02;       // variance of a station's place along x, in squared steps between nodes
 
 /// One camera of one observation.
 struct Viewer {
@@ -87,11 +90,9 @@ class JointSolver {
     collect_rows(observations);
     std::vector<double> out_of_round;
     for (const ObservedForging& observed : observations) out_of_round.push_back(observed.out_of_round_mm);
-    out_of_round_mm_ = std::max(median(out_of_round), 2e-3 * radius_mm_);
+    out_of_round_mm_ = std::max(median(out_of_round), kLeastOutOfRound * radius_mm_);
     place_sum_.assign(observations.size(), Vector6d::Zero());
     camera_solution_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(viewers_.size()) * kCameraUnknowns);
-    // Start wide: what the first axis leaves over must not be taken for faults.
-    noise_scale_ = 0.01 * radius_mm_ / std::sqrt(median_variance());
   }
 
   std::optional<JointEstimate> run() {
@@ -145,12 +146,6 @@ class JointSolver {
       from = to;
     }
     return steps;
-  }
-
-  double median_variance() const {
-    std::vector<double> values;
-    for (const Row& row : rows_) values.push_back(row.variance_mm2);
-    return values.empty() ? 1.0 : median(values);
   }
 
   int place_column(std::size_t observation) const {
@@ -294,10 +289,10 @@ class JointSolver {
     const RodSurface rod(nodes_, step_mm_);
     equations.clear();
     equations.reserve(rows_.size());
-    for (Row& row : rows_) {
-      equations.push_back(equation_of(row, rod));
-      if (equations.back()) add_equation(row, *equations.back());
-    }
+    for (Row& row : rows_) equations.push_back(equation_of(row, rod));
+    if (!(noise_scale_ > 0.0)) noise_scale_ = std::max(kLeastNoise, rim_scatter(equations));
+    for (std::size_t r = 0; r < rows_.size(); ++r)
+      if (equations[r]) add_equation(rows_[r], *equations[r]);
     if (!system_.solve()) return false;
     system_.node_covariances(own_, with_next_);
     return true;
@@ -312,7 +307,7 @@ class JointSolver {
     move_places();
     // The last round leaves amounts and solution belonging to each other.
     if (last) return true;
-    learn_noise(equations);
+    weigh(equations);
     prior_.learn(nodes_, own_, with_next_, static_cast<int>(placements_.size()), out_of_round_mm_);
     return true;
   }
@@ -320,7 +315,7 @@ class JointSolver {
   void add_equation(const Row& row, const Equation& equation) {
     const std::size_t i = equation.node;
     const double w =
-        row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * correlation_ + equation.extra_variance_mm2);
+        row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * kTogether + equation.extra_variance_mm2);
     const double next = equation.share;
     const double here = 1.0 - next;
     const NodeVector& g = equation.coefficients;
@@ -398,12 +393,28 @@ class JointSolver {
     return std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
   }
 
-  /// Scatter of the tangents about the model, how far it is correlated along the rims, and whom to trust.
-  void learn_noise(std::span<const std::optional<Equation>> equations) {
-    double sum = 0.0;
-    double count = 0.0;
-    double neighbours = 0.0;
-    double squares = 0.0;
+  /// Scatter of the tangents along their rims, from second differences wide enough to see what haze and filtering move
+  /// together; read off the start, not off the estimate, which could bend itself to the tangents until none scatter.
+  double rim_scatter(std::span<const std::optional<Equation>> equations) const {
+    constexpr std::size_t kApart = 8;  // stations: some 25 px
+    std::vector<double> bends;
+    for (std::size_t r = 0; r + 2 * kApart < rows_.size(); ++r) {
+      bool same_rim = true;
+      for (std::size_t k = r + 1; k <= r + 2 * kApart && same_rim; ++k) same_rim = rows_[k].continues;
+      const Row &a = rows_[r], &b = rows_[r + kApart], &c = rows_[r + 2 * kApart];
+      if (!same_rim || !(a.trust > 0.0 && b.trust > 0.0 && c.trust > 0.0)) continue;
+      if (!equations[r] || !equations[r + kApart] || !equations[r + 2 * kApart]) continue;
+      const auto off = [&](std::size_t k) {
+        const Equation& e = *equations[k];
+        return e.value_mm - e.coefficients.dot((1.0 - e.share) * start_[e.node] + e.share * start_[e.node + 1]);
+      };
+      bends.push_back(std::abs(off(r) - 2.0 * off(r + kApart) + off(r + 2 * kApart)) / std::sqrt(b.variance_mm2));
+    }
+    return bends.empty() ? 1.0 : 1.4826 * median(bends) / std::sqrt(6.0);
+  }
+
+  /// Whom to trust in the next round.
+  void weigh(std::span<const std::optional<Equation>> equations) {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
       Row& row = rows_[r];
       if (!row.used) continue;
@@ -413,31 +424,9 @@ class JointSolver {
       const double fitted = here * here * g.dot(own_[e.node] * g) + e.share * e.share * g.dot(own_[e.node + 1] * g) +
                             2.0 * here * e.share * g.dot(with_next_[e.node] * g);
       const double expected = row.residual_mm * row.residual_mm + fitted;
-      const double variance = row.variance_mm2 * noise_scale_ * noise_scale_;
-      if (e.extra_variance_mm2 > variance) {
-        // What a shoulder leaves open is no scatter of the edge.
-        row.trust = (kFreedom + 1.0) / (kFreedom + expected / (variance + e.extra_variance_mm2)) * belongs(row, e);
-        continue;
-      }
-      // A tangent that the estimate bends itself to says less of the scatter.
-      const double open = std::min(1.0, row.trust * fitted / (variance * correlation_));
+      const double variance = row.variance_mm2 * noise_scale_ * noise_scale_ + e.extra_variance_mm2;
       row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance) * belongs(row, e);
-      sum += row.trust * row.residual_mm * row.residual_mm / row.variance_mm2;
-      count += 1.0 - open;
-      if (row.continues && r > 0 && rows_[r - 1].used) {
-        const double here_trust =
-            std::sqrt(row.trust * rows_[r - 1].trust / (row.variance_mm2 * rows_[r - 1].variance_mm2));
-        neighbours += here_trust * row.residual_mm * rows_[r - 1].residual_mm;
-        squares += 0.5 * (row.trust * row.residual_mm * row.residual_mm / row.variance_mm2 +
-                          rows_[r - 1].trust * rows_[r - 1].residual_mm * rows_[r - 1].residual_mm /
-                              rows_[r - 1].variance_mm2);
-      }
     }
-    if (count < 0.05 * static_cast<double>(rows_.size())) return;
-    // Never below a fifth of the stated sigma: exact input must not make the equations singular.
-    noise_scale_ = std::max(0.2, std::sqrt(sum / count));
-    const double correlation = squares > 0.0 ? std::clamp(neighbours / squares, 0.0, 0.9) : 0.0;
-    correlation_ = (1.0 + correlation) / (1.0 - correlation);
   }
 
   CombineConfig config_;
@@ -456,9 +445,8 @@ class JointSolver {
   std::vector<std::pair<double, double>> radius_range_;  ///< about each node, of the start
   std::vector<Vector6d> place_sum_;
   Eigen::VectorXd camera_solution_;
-  double noise_scale_ = 1.0;
+  double noise_scale_ = 0.0;      ///< of the stated sigmas; found in the first round
   double out_of_round_mm_ = 0.0;  ///< robust sigma of the tangents about the circles
-  double correlation_ = 1.0;
 };
 
 }  // namespace

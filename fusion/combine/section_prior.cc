@@ -13,7 +13,7 @@ double spectrum(int k) { return static_cast<double>(kFirstHarmonic) / k; }
 /// between two shoulders. For the estimate a shorter length keeps them even; the interval takes the whole.
 constexpr double kEstimateShare = 0.3;
 
-constexpr double kLeastBend = 1e-5;
+constexpr double kLeastBend = 2e-4;
 
 /// Precision of one step of an integrated random walk (value, slope) with unit density.
 Eigen::Matrix2d bend_precision(double h) {

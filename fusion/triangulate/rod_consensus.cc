@@ -37,8 +37,8 @@ bool within(const AxisCurve& axis, double x_mm) {
   return position > -1.0 && position < static_cast<double>(axis.yz_mm.size());
 }
 
-/// Radius along the axis by dynamic programming: every rim point rewards the radii near its own distance, a change of
-/// radius costs, but never more than a step does.
+/// Radius along the axis by dynamic programming: every rim point rewards the radii near its own distance that others
+/// see too, a change of radius costs, but never more than a step does.
 class RadiusPath {
  public:
   RadiusPath(const ForgingSpec& forging, double scale_mm)
@@ -48,15 +48,18 @@ class RadiusPath {
 
   std::vector<double> find(const AxisCurve& axis, std::span<const RimTangent> tangents) const {
     const std::size_t n = axis.yz_mm.size();
-    std::vector<Levels> reward(n, Levels::Zero());
+    std::vector<Levels> reward(n, Levels::Zero()), best(n, Levels::Zero());
     for (const RimTangent& tangent : tangents) {
       if (!within(axis, tangent.contact.x_mm)) continue;
-      Levels& here = reward[sample_of(axis, tangent.contact.x_mm)];
+      const std::size_t at = sample_of(axis, tangent.contact.x_mm);
       for (int level = 0; level < kLevels; ++level) {
         const double z = (tangent.contact.distance_mm - radius(level)) / scale_mm_;
-        here(level) += tangent.weight / (1.0 + z * z);
+        const double agreement = tangent.weight / (1.0 + z * z);
+        reward[at](level) += agreement;
+        best[at](level) = std::max(best[at](level), agreement);
       }
     }
+    for (std::size_t i = 0; i < n; ++i) reward[i] -= (1.0 - kAlone) * best[i];
     return refined(best_path(reward), axis, tangents);
   }
 
@@ -65,7 +68,8 @@ class RadiusPath {
   // In units of what one rim point in full agreement gives.
   static constexpr double kStepCost = 6.0;
   static constexpr double kLevelCost = 0.5;
-  static constexpr int kTaper = 3;  // levels; a step changes more within a few samples
+  static constexpr double kAlone = 0.1;  ///< what a rim that no other one agrees with counts: it may follow a beam
+  static constexpr int kTaper = 3;       // levels; a step changes more within a few samples
   using Levels = Eigen::Array<double, kLevels, 1>;
 
   [[nodiscard]] double radius(int level) const { return low_mm_ + pitch_mm_ * level; }
