@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "fusion/results/measurement.h"
 #include "tests/unit/temporary_folder.h"
 
 namespace imprint {
