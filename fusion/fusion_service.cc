@@ -129,6 +129,7 @@ void FusionService::work() {
   }
   evaluate();
   while (!queue_->finished()) {
+    ++turns_;
     const Time idle_until = std::chrono::steady_clock::now() + kIdleWait;
     auto message = queue_->pop_until(std::min(assembler_.next_deadline().value_or(idle_until), idle_until));
     for (std::size_t i = 0; message && i < kMaxInOneGo; ++i) {
@@ -141,6 +142,7 @@ void FusionService::work() {
 }
 
 void FusionService::handle(const Message& message) {
+  ++turns_;
   switch (message.kind) {
     case Kind::trigger:
       return receive_trigger(message);
@@ -235,6 +237,7 @@ void FusionService::receive_liveness(const std::string& camera_id, bool alive) {
 }
 
 void FusionService::recall(const std::string& session) {
+  ++turns_;
   const auto messages = store_.messages(session);
   if (!messages) {
     spdlog::error("session {}: {}", session, messages.error().message);
@@ -260,6 +263,7 @@ void FusionService::evaluate() {
 }
 
 void FusionService::make_result(const std::string& session) {
+  ++turns_;
   StoredResult result;
   result.session = session;
   result.complete = assembler_.complete(session);
@@ -346,6 +350,7 @@ bool FusionService::surely(const std::function<Result<T>()>& write, T& outcome) 
       spdlog::error("{}; tried again until it succeeds", done.error().message);
     }
     if (stopping_) return false;
+    ++turns_;  // a full disk is no hang: a restart would not help
     std::this_thread::sleep_for(kRetryWait);
   }
 }

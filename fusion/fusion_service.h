@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
@@ -41,6 +42,9 @@ class FusionService {
   Result<void> start();
   /// Stores what has been received so far, then ends.
   void stop();
+  /// Grows with every turn of the worker's loop and with every message, write that is tried again and session in it;
+  /// at least once a second as long as the worker does not hang. A fusion counts once, when it is done.
+  [[nodiscard]] std::uint64_t turns() const { return turns_; }
 
  private:
   enum class Kind { trigger, imprint, health, alive, gone };
@@ -88,6 +92,7 @@ class FusionService {
   std::unique_ptr<Publisher> trigger_publisher_;
   std::vector<std::unique_ptr<Declaration>> declarations_;
   std::atomic<bool> stopping_ = false;
+  std::atomic<std::uint64_t> turns_ = 0;
   std::thread worker_;
   std::thread answerer_;
 };

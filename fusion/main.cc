@@ -14,9 +14,18 @@ namespace {
 
 constexpr auto kIdleWait = std::chrono::milliseconds(60'000);
 
-void attend(StopSignal& stop) {
-  const auto watchdog = watchdog_period();
-  while (!stop.wait_for(watchdog.value_or(kIdleWait))) notify_watchdog();
+// Until told to stop: the watchdog as long as the worker gets on.
+void attend(const FusionService& service, StopSignal& stop) {
+  const auto period = watchdog_period();
+  LoopWatchdog watchdog([&] { return service.turns(); });
+  bool hung = false;
+  while (!stop.wait_for(period.value_or(kIdleWait))) {
+    if (!period) continue;
+    const bool turned = watchdog.attend();
+    if (!turned && !hung)
+      spdlog::error("the worker has not turned for {} ms; systemd is not told that all is well", period->count());
+    hung = !turned;
+  }
 }
 
 Result<void> check_store(const FusionConfig& config) {
@@ -63,7 +72,7 @@ Result<void> run(const ProgramOptions& options) {
   spdlog::info("fusion of {}/{} ready, {} cameras, page http://{}:{}/", config->site, config->line, camera_ids.size(),
                config->page.address, (*page)->port());
   notify_ready("fusion ready");
-  attend(stop);
+  attend(service, stop);
   notify_stopping();
   service.stop();
   spdlog::info("fusion stopped");

@@ -16,4 +16,12 @@ std::optional<std::chrono::milliseconds> watchdog_period() {
   return std::chrono::milliseconds(period_us / 2000);
 }
 
+bool LoopWatchdog::attend() {
+  const std::uint64_t turns = turns_();
+  if (told_at_ == turns) return false;
+  told_at_ = turns;
+  notify_watchdog();
+  return true;
+}
+
 }  // namespace imprint

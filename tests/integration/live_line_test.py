@@ -93,16 +93,20 @@ period_s = 0.5
             if process.stdout:
                 process.stdout.close()
 
-    def start(self, name, command):
+    def start(self, name, command, environment=None):
         with open(self.folder / f"{name}.log", "ab") as log:
-            self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log)
+            self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log,
+                                                    env={**os.environ, **(environment or {})})
 
-    def start_fusion(self):
-        self.start("fusion", [FUSION, "--config", self.fusion_config])
+    def start_fusion(self, **environment):
+        self.start("fusion", [FUSION, "--config", self.fusion_config], environment)
 
-    def start_nodes(self, *cameras):
+    def start_nodes(self, *cameras, **settings):
         for camera in cameras:
-            self.start(camera, [NODE, "--config", self.node_config, "--set", f"node.camera_id={camera}"])
+            command = [NODE, "--config", self.node_config, "--set", f"node.camera_id={camera}"]
+            for key, value in settings.items():
+                command += ["--set", f"{key.replace('__', '.')}={value}"]
+            self.start(camera, command)
 
     def end(self, name, with_signal):
         """Ends a process and gives its exit status and how long that took."""
@@ -186,7 +190,7 @@ class LiveLineTest(unittest.TestCase):
             self.assertEqual({event["camera"] for event in events if event["event"] == "imprint"}, {"cam1", "cam2", "cam3"})
             self.assertEqual({event["event"] for event in events}, {"camera", "trigger", "imprint", "result"})
 
-            for path in ("/", "/api/status", "/api/cameras", "/api/sessions", "/api/result/latest", "/healthz"):
+            for path in ("/", "/api/status", "/api/cameras", "/api/sessions", "/api/result/latest", "/api/plots/S", "/healthz"):
                 with urllib.request.urlopen(f"http://127.0.0.1:{line.page}{path}", timeout=10) as answer:
                     self.assertEqual(answer.status, 200, path)
             with self.assertRaises(urllib.error.HTTPError) as refused:
@@ -198,6 +202,34 @@ class LiveLineTest(unittest.TestCase):
                 status, took_s = line.end(name, signal.SIGTERM)
                 self.assertEqual(status, 0, name)
                 self.assertLess(took_s, 3 * SANITIZED_FACTOR, name)  # idle: nothing to finish
+
+    def test_simulated_cameras_give_what_their_pictures_give(self):
+        with Line() as line:
+            line.start_fusion()
+            line.start_nodes("cam1", "cam2", "cam3", capture__source='"simulation"', capture__path=f'"{SCENE}"')
+            line.wait_alive("cam1", "cam2", "cam3")
+            for observation in range(len(rotations)):
+                result = line.trigger(observation, len(rotations))
+            self.assert_same_geometry(result, reference)
+
+    def test_systemd_hears_that_fusion_is_ready_and_turns(self):
+        with Line() as line, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+            systemd.bind(str(line.folder / "notify"))
+            systemd.settimeout(PATIENCE_S)
+            line.start_fusion(NOTIFY_SOCKET=str(line.folder / "notify"), WATCHDOG_USEC="4000000")
+            self.assertTrue(systemd.recv(4096).startswith(b"READY=1"))
+            begin = time.monotonic()
+            self.assertEqual([systemd.recv(4096) for _ in range(3)], [b"WATCHDOG=1"] * 3)
+            self.assertGreater(time.monotonic() - begin, 5)  # every 2 s, half of what is allowed
+            self.assertEqual(line.end("fusion", signal.SIGTERM)[0], 0)
+            systemd.settimeout(0)
+            heard = set()
+            while True:
+                try:
+                    heard.add(systemd.recv(4096))
+                except BlockingIOError:
+                    break
+            self.assertIn(b"STOPPING=1", heard)
 
     def test_camera_that_never_reports_is_left_out_and_named(self):
         with Line(deadline_s=5 * SANITIZED_FACTOR) as line:

@@ -48,6 +48,7 @@ struct Plant {
   std::vector<Trigger> seen_triggers;
   std::vector<std::unique_ptr<Declaration>> declarations;
   FusionConfig config;
+  std::atomic<bool> hang = false;  // the fusion does not come back as long as this is set
 
   std::unique_ptr<SessionStore> store;
   std::unique_ptr<LineBoard> board;
@@ -82,7 +83,11 @@ struct Plant {
         std::make_unique<LineBoard>(LineBoard::Identity{"plant", "L1", "best", "0"},
                                     std::vector<std::string>{"cam1", "cam2", "cam3"}, std::chrono::steady_clock::now());
     inside = open_memory(bus);
-    fusion = std::make_unique<FusionService>(config, rig, *inside, *store, *board, count_imprints);
+    fusion = std::make_unique<FusionService>(config, rig, *inside, *store, *board,
+                                             [this](const auto& observations, const auto&... rest) {
+                                               while (hang) std::this_thread::sleep_for(1ms);
+                                               return count_imprints(observations, rest...);
+                                             });
     REQUIRE(fusion->start());
   }
 
@@ -199,8 +204,8 @@ TEST_CASE("fusion: a late imprint of a finished session after a restart adds to 
   plant.stop();
   plant.start();
   plant.answer("cam3", 0, 1);
-  REQUIRE(eventually([&] { return plant.result_count() == 2; }));
-  REQUIRE(length_of(plant.last_result()) == 3.0);
+  // The trigger comes again from its history; when it is ahead of the imprint the session is evaluated in between.
+  REQUIRE(eventually([&] { return plant.result_count() >= 2 && length_of(plant.last_result()) == 3.0; }));
   REQUIRE(plant.last_result().complete);
 }
 
@@ -248,6 +253,25 @@ TEST_CASE("fusion: what is malformed, too large, of a foreign camera or under a 
   REQUIRE(plant.counted("imprints") == 1);
   REQUIRE(plant.counted("repeated") == 1);
   REQUIRE(plant.store->messages("S")->size() == 1);
+}
+
+TEST_CASE("fusion: its turns are counted while it is idle and while it works, not while a fusion hangs") {
+  Plant plant(0.2);
+  const auto turned_since = [&](std::uint64_t turns) {
+    return eventually([&] { return plant.fusion->turns() > turns; });
+  };
+  REQUIRE(turned_since(0));
+  REQUIRE(turned_since(plant.fusion->turns()));  // idle
+  plant.hang = true;
+  plant.trigger(0, 1);
+  plant.answer("cam1", 0, 1);
+  std::this_thread::sleep_for(1s);  // the deadline has long passed, the fusion has begun
+  const std::uint64_t turns = plant.fusion->turns();
+  std::this_thread::sleep_for(2500ms);  // idle it would turn twice
+  REQUIRE(plant.fusion->turns() == turns);
+  plant.hang = false;
+  REQUIRE(turned_since(turns));
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
 }
 
 TEST_CASE("fusion: it answers what a session's result is, and that there is none") {
