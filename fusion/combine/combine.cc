@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "fusion/combine/alignment.h"
 #include "fusion/combine/circularity.h"
@@ -92,6 +93,29 @@ AxisCurve first_axis(const ObservedForging& observed, const Placement& placement
   for (int i = 0; i < nodes; ++i) axis.yz_mm.emplace_back(source.at(i * axis.x_step_mm).point_mm.tail<2>());
   axis.set_slopes();
   return axis;
+}
+
+/// Where no tangent tells the radius, such as on a shoulder that no camera sees sharply, it lies on the line between
+/// the nearest sections that are known; the intervals there stay as wide as they are.
+void bridge_unknown_radii(JointEstimate& joint) {
+  constexpr double kTimesUsual = 8.0, kLeastShare = 0.002;  // of the usual sigma; of the radius
+  std::vector<double> sigmas;
+  for (const NodeMatrix& covariance : joint.covariance) sigmas.push_back(std::sqrt(covariance(kRadius, kRadius)));
+  std::vector<double> sorted = sigmas;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  const auto known = [&](std::size_t i) {
+    return sigmas[i] <= std::max(kTimesUsual * usual, kLeastShare * std::abs(joint.nodes[i](kRadius)));
+  };
+  std::optional<std::size_t> before;
+  for (std::size_t i = 0; i < joint.nodes.size(); ++i) {
+    if (!known(i)) continue;
+    for (std::size_t k = before ? *before + 1 : i; before && k < i; ++k) {
+      const double t = static_cast<double>(k - *before) / static_cast<double>(i - *before);
+      joint.nodes[k](kRadius) = (1.0 - t) * joint.nodes[*before](kRadius) + t * joint.nodes[i](kRadius);
+    }
+    before = i;
+  }
 }
 
 /// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
@@ -210,6 +234,7 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
   const double shift_sigma = std::max(ends.length_sigma_mm(), 1e-3 * observations[0].radius_mm);
   auto joint = estimate_jointly(observations, placements, axis, radii, shift_sigma, config);
   if (!joint) return job_failed("the tangents of the observations do not determine a forging");
+  bridge_unknown_radii(*joint);
 
   radii.clear();
   for (const NodeVector& node : joint->nodes) radii.push_back(node(kRadius));

@@ -167,8 +167,8 @@ std::string text(const Deviation& d) {
   return fmt::format(
       "axis rms {:.4f} max {:.3f} (ci {:.3f}) | diameter rms {:.4f} best 90 % {:.4f} | circularity mean {:+.3f} sigma "
       "{:.3f} | length {:+.3f} | covered axis {:.3f} diameter {:.3f} circularity {:.3f}",
-      d.axis_rms, d.axis_max, d.axis_ci95, d.diameter_rms, d.diameter_best90_rms, d.circularity_mean, d.circularity_sigma,
-      d.length, d.axis_covered, d.diameter_covered, d.circularity_covered);
+      d.axis_rms, d.axis_max, d.axis_ci95, d.diameter_rms, d.diameter_best90_rms, d.circularity_mean,
+      d.circularity_sigma, d.length, d.axis_covered, d.diameter_covered, d.circularity_covered);
 }
 
 Deviation measured_deviation(const Rod& rod, const Session& session, bool skip_shoulders = false) {
@@ -228,7 +228,8 @@ TEST_CASE("combine: shoulders of 3 mm per mm stay sharp") {
   const Rod rod = stepped_rod();
   const Deviation d = measured_deviation(rod, observe(rod, {.noise_px = 0.1}));
   INFO(text(d));
-  // A tenth of the sections next to a shoulder may be off by 0.5 mm of place times 3; the goal of the paper's successor.
+  // A tenth of the sections next to a shoulder may be off by 0.5 mm of place times 3; the goal of the paper's
+  // successor.
   CHECK(d.diameter_rms < 0.5);
   CHECK(d.diameter_best90_rms < 0.1);
 }
@@ -255,7 +256,8 @@ TEST_CASE("combine: one observation of a rod 5 mm out of round reaches 0.8 mm of
   }
 }
 
-TEST_CASE("combine: six observations reach 0.10 mm of axis, 0.32 mm of diameter with shoulders, 0.35 mm of circularity") {
+TEST_CASE(
+    "combine: six observations reach 0.10 mm of axis, 0.32 mm of diameter with shoulders, 0.35 mm of circularity") {
   Rod rod = stepped_rod();
   make_out_of_round(rod, 5.0, 200.0, 7);
   const Deviation d = measured_deviation(rod, observe(rod, {.observations = 6, .noise_px = 0.1, .seed = 7}));
@@ -350,14 +352,16 @@ TEST_CASE("combine: the 95 % intervals cover the truth of one observation in 90 
   for (unsigned seed = 1; seed <= kRods; ++seed) {
     Rod rod = seed % 2 == 0 ? stepped_rod() : bent_rod();
     make_out_of_round(rod, 1.0 + 0.4 * (seed % 5), 120.0 + 60.0 * (seed % 4), 20 + seed);
-    const Deviation d = measured_deviation(rod, observe(rod, {.noise_px = 0.1, .pose_sigma_mm = 0.3, .seed = 20 + seed}));
+    const Deviation d =
+        measured_deviation(rod, observe(rod, {.noise_px = 0.1, .pose_sigma_mm = 0.3, .seed = 20 + seed}));
     WARN(text(d));
     sum.axis_covered += d.axis_covered / kRods;
     sum.diameter_covered += d.diameter_covered / kRods;
     sum.circularity_covered += d.circularity_covered / kRods;
     sum.length_in_ci += d.length_in_ci / kRods;
   }
-  INFO("axis " << sum.axis_covered << " diameter " << sum.diameter_covered << " circularity " << sum.circularity_covered);
+  INFO("axis " << sum.axis_covered << " diameter " << sum.diameter_covered << " circularity "
+               << sum.circularity_covered);
   CHECK(sum.axis_covered > 0.90);
   CHECK(sum.diameter_covered > 0.90);
   CHECK(sum.circularity_covered > 0.90);
@@ -371,7 +375,8 @@ TEST_CASE("combine: the 95 % intervals of three observations cover 90 to 100 % a
     Rod rod = seed % 2 == 0 ? stepped_rod() : bent_rod();
     make_out_of_round(rod, 3.0, 200.0, 40 + seed);
     const Deviation d = measured_deviation(
-        rod, observe(rod, {.observations = 3, .step_deg = 60.0, .noise_px = 0.1, .pose_sigma_mm = 0.3, .seed = 40 + seed}));
+        rod,
+        observe(rod, {.observations = 3, .step_deg = 60.0, .noise_px = 0.1, .pose_sigma_mm = 0.3, .seed = 40 + seed}));
     WARN(text(d));
     sum.axis_covered += d.axis_covered / kRods;
     sum.diameter_covered += d.diameter_covered / kRods;
@@ -379,7 +384,8 @@ TEST_CASE("combine: the 95 % intervals of three observations cover 90 to 100 % a
     sum.axis_rms += d.axis_rms / kRods;
     sum.axis_ci95 += d.axis_ci95 / kRods;
   }
-  INFO("axis " << sum.axis_covered << " diameter " << sum.diameter_covered << " circularity " << sum.circularity_covered);
+  INFO("axis " << sum.axis_covered << " diameter " << sum.diameter_covered << " circularity "
+               << sum.circularity_covered);
   CHECK(sum.axis_covered > 0.90);
   CHECK(sum.diameter_covered > 0.90);
   CHECK(sum.circularity_covered > 0.88);

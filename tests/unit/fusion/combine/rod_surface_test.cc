@@ -18,13 +18,16 @@ std::vector<NodeVector> straight_rod(double radius) {
 }
 
 /// A ray from `center` through `point`.
-Eigen::Vector3d towards(const Eigen::Vector3d& center, const Eigen::Vector3d& point) { return (point - center).normalized(); }
+Eigen::Vector3d towards(const Eigen::Vector3d& center, const Eigen::Vector3d& point) {
+  return (point - center).normalized();
+}
 
 /// A ray that touches the surface at `point`, from 7 m away, `aslant` along x per unit of travel.
 Eigen::Vector3d origin_of_tangent(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double aslant) {
   Eigen::Vector3d direction = normal.cross(Eigen::Vector3d::UnitX()).normalized();
   // Within the tangent plane: leave out what would leave it.
-  direction += aslant * (Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitX().dot(normal.normalized()) * normal.normalized());
+  direction +=
+      aslant * (Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitX().dot(normal.normalized()) * normal.normalized());
   return point - 7000.0 * direction.normalized();
 }
 

@@ -57,8 +57,7 @@ double axis_error(const ObservedForging& observed) {
 /// The forge's first camera with its pose moved, as if its targets had been misread.
 Imprint misplaced(Imprint imprint, const Eigen::Vector3d& shift_mm, double turn_deg) {
   imprint.pose.center_world_mm += shift_mm;
-  imprint.pose.R_cam_world =
-      rotation_from_vector({0.0, turn_deg * M_PI / 180.0, 0.0}) * imprint.pose.R_cam_world;
+  imprint.pose.R_cam_world = rotation_from_vector({0.0, turn_deg * M_PI / 180.0, 0.0}) * imprint.pose.R_cam_world;
   return imprint;
 }
 
@@ -85,18 +84,18 @@ TEST_CASE("triangulate: every tangent touches the bar it came from") {
   double worst = 0.0;
   for (const ObservedSection& section : observed->sections) {
     for (const TangentPlane& tangent : section.tangents) {
-      const double x = (bar().lying.R.transpose() *
-                        (observed->start_world_mm +
-                         tangent.s_mm * (observed->end_world_mm - observed->start_world_mm).normalized() -
-                         bar().lying.origin_mm))
-                           .x();
+      const double x =
+          (bar().lying.R.transpose() *
+           (observed->start_world_mm + tangent.s_mm * (observed->end_world_mm - observed->start_world_mm).normalized() -
+            bar().lying.origin_mm))
+              .x();
       const Eigen::Vector3d axis = bar().end_world(std::clamp(x, 0.0, 1900.0));
       worst = std::max(worst, std::abs(tangent.offset_mm - tangent.normal_world.dot(axis) - 130.0));
       ++count;
     }
   }
   CHECK(count > 2800);  // six rims of 500 stations, less those on the end arcs
-  CHECK(worst < 0.3);  // as the axis: the slope of its smoothed curve is least sure at the ends
+  CHECK(worst < 0.3);   // as the axis: the slope of its smoothed curve is least sure at the ends
 }
 
 TEST_CASE("triangulate: a forging that lies the other way round has the same first end along axis_direction") {
@@ -285,7 +284,8 @@ TEST_CASE("end_planes: three readings on one side of a tilted face still give it
   const Eigen::Vector2d tilt(0.004, -0.003);
   std::vector<EndPoint> points;
   for (const double angle : {3.0, 50.0, 130.0}) {
-    const Eigen::Vector2d beside = 130.0 * Eigen::Vector2d(std::cos(angle * M_PI / 180.0), std::sin(angle * M_PI / 180.0));
+    const Eigen::Vector2d beside =
+        130.0 * Eigen::Vector2d(std::cos(angle * M_PI / 180.0), std::sin(angle * M_PI / 180.0));
     points.push_back({.last = true, .x_mm = 1900.0 + tilt.dot(beside), .beside_mm = beside, .sigma_mm = 0.05});
     points.push_back({.last = false, .x_mm = 0.0, .beside_mm = beside, .sigma_mm = 0.05});
   }
