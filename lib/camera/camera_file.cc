@@ -59,7 +59,8 @@ Result<CameraModel> read_camera_file(const std::filesystem::path& path) {
   return camera;
 }
 
-Result<void> write_camera_file(const CameraModel& camera, const std::filesystem::path& path) {
+Result<void> write_camera_file(const CameraModel& camera, const std::filesystem::path& path,
+                               const std::string& record) {
   const auto& d = camera.distortion;
   return write_file_atomically(
       path, fmt::format("[camera]\n"
@@ -74,10 +75,10 @@ Result<void> write_camera_file(const CameraModel& camera, const std::filesystem:
                         "r0 = {:#}\n"
                         "radial = [{:#}, {:#}, {:#}]\n"
                         "tangential = [{:#}, {:#}]\n"
-                        "affine = [{:#}, {:#}]\n",
+                        "affine = [{:#}, {:#}]\n{}",
                         camera.id, camera.width_px, camera.height_px, camera.pixel_pitch_um, camera.focal_length_px,
                         camera.principal_point.x_px, camera.principal_point.y_px, d.r0, d.radial[0], d.radial[1],
-                        d.radial[2], d.tangential[0], d.tangential[1], d.affine[0], d.affine[1]));
+                        d.radial[2], d.tangential[0], d.tangential[1], d.affine[0], d.affine[1], record));
 }
 
 }  // namespace imprint

@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "lib/camera/balanced_distortion.h"
+
 namespace imprint {
 namespace {
 
@@ -11,15 +13,9 @@ struct Normalized {
   double u, v;
 };
 
-// u + du and v + dv of contract section 1.
 Normalized distort_normalized(const BalancedDistortion& d, Normalized p) {
-  const double q = d.r0 * d.r0;
-  const double r2 = p.u * p.u + p.v * p.v;
-  const double radial =
-      d.radial[0] * (r2 - q) + d.radial[1] * (r2 * r2 - q * q) + d.radial[2] * (r2 * r2 * r2 - q * q * q);
-  const double b1 = d.tangential[0], b2 = d.tangential[1], c1 = d.affine[0], c2 = d.affine[1];
-  return {p.u + p.u * radial + b1 * (r2 + 2 * p.u * p.u) + 2 * b2 * p.u * p.v + c1 * p.u + c2 * p.v,
-          p.v + p.v * radial + b2 * (r2 + 2 * p.v * p.v) + 2 * b1 * p.u * p.v};
+  const auto [u, v] = distort_balanced(d.terms().data(), d.r0, p.u, p.v);
+  return {u, v};
 }
 
 Eigen::Matrix2d jacobian_normalized(const BalancedDistortion& d, Normalized p) {

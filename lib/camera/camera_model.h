@@ -15,6 +15,10 @@ struct BalancedDistortion {
   std::array<double, 3> radial{};      // A1, A2, A3
   std::array<double, 2> tangential{};  // B1, B2
   std::array<double, 2> affine{};      // C1, C2
+
+  [[nodiscard]] std::array<double, 7> terms() const {
+    return {radial[0], radial[1], radial[2], tangential[0], tangential[1], affine[0], affine[1]};
+  }
 };
 
 /// One camera's interior orientation; the model of contract section 1.

@@ -1,0 +1,292 @@
+#include "lib/adjust/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+#include <Eigen/SVD>
+
+#include "lib/camera/balanced_distortion.h"
+#include "lib/geometry/rotation.h"
+
+namespace imprint {
+namespace {
+
+// [B] equation 1 for one target in one image, in standard deviations of its centre.
+struct ReprojectionError {
+  ObservedPoint at;
+  double sigma_px, n_px, r0;
+
+  template <class T>
+  bool operator()(const T* interior, const T* turn, const T* center, const T* point, T* residual) const {
+    const T from_center[3] = {point[0] - center[0], point[1] - center[1], point[2] - center[2]};
+    T p[3];
+    ceres::AngleAxisRotatePoint(turn, from_center, p);
+    if (!(p[2] > T(0))) return false;
+    const T scale = interior[0] / (p[2] * n_px);
+    const auto [u, v] = distort_balanced(interior + 3, r0, T(p[0] * scale), T(p[1] * scale));
+    residual[0] = (at.x_px - interior[1] - n_px * u) / sigma_px;
+    residual[1] = (at.y_px - interior[2] - n_px * v) / sigma_px;
+    return true;
+  }
+};
+
+struct FieldError {
+  Eigen::Vector3d stated_mm;
+  double sigma_mm;
+
+  template <class T>
+  bool operator()(const T* point, T* residual) const {
+    for (int k = 0; k < 3; ++k) residual[k] = (point[k] - stated_mm[k]) / sigma_mm;
+    return true;
+  }
+};
+
+struct Observation {
+  std::size_t image = 0;
+  PointObservation point;
+  double sigma_px = 0.0;
+  bool used = true;
+  Eigen::Vector2d residual_px = Eigen::Vector2d::Zero();
+};
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class Adjustment {
+ public:
+  Adjustment(const CameraModel& start, const std::vector<CalibrationImage>& images, const TargetField& field,
+             const CalibrateConfig& config)
+      : start_(start), images_(images), field_(field), config_(config) {
+    interior_ = {start.focal_length_px, start.principal_point.x_px, start.principal_point.y_px};
+    for (const CalibrationImage& image : images) {
+      std::array<double, 3> turn{}, center{};
+      ceres::RotationMatrixToAngleAxis(image.start.R_cam_world.data(), turn.data());  // both by columns
+      std::copy_n(image.start.center_world_mm.data(), 3, center.data());
+      turns_.push_back(turn);
+      centers_.push_back(center);
+      for (const PointObservation& point : image.points) {
+        const auto target = field.targets.find(point.id);
+        if (target == field.targets.end()) continue;
+        std::copy_n(target->second.p_world_mm.data(), 3, points_[point.id].data());
+        observations_.push_back({.image = centers_.size() - 1,
+                                 .point = point,
+                                 .sigma_px = std::hypot(point.sigma_px, config.noise_floor_px)});
+      }
+    }
+  }
+
+  Result<Calibration> run() {
+    // Robust first; then least squares over what fits, until it is the same targets.
+    if (auto solved = solve(true); !solved) return pass_on(solved.error());
+    for (int round = 0; round < 6 && choose(); ++round)
+      if (auto solved = solve(false); !solved) return pass_on(solved.error());
+    if (auto plausible = check(); !plausible) return pass_on(plausible.error());
+    return describe();
+  }
+
+ private:
+  Result<void> solve(bool robust) {
+    ceres::Problem::Options options;
+    problem_.emplace(options);
+    for (Observation& o : observations_) {
+      if (!robust && !o.used) continue;
+      auto* cost = new ceres::AutoDiffCostFunction<ReprojectionError, 2, kInteriorTerms, 3, 3, 3>(
+          new ReprojectionError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
+      // Far below what a wrong id does and well above what a start value is off.
+      auto* loss = robust ? new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px)) : nullptr;
+      problem_->AddResidualBlock(cost, loss, interior_.data(), turns_[o.image].data(), centers_[o.image].data(),
+                                 points_[o.point.id].data());
+    }
+    for (auto& [id, point] : points_) {
+      if (!problem_->HasParameterBlock(point.data())) continue;
+      const FieldTarget& target = field_.targets.at(id);
+      if (const double sigma = target.sigma_mm.value_or(0.0); sigma > 0.0) {
+        problem_->AddResidualBlock(
+            new ceres::AutoDiffCostFunction<FieldError, 3, 3>(new FieldError{target.p_world_mm, sigma}), nullptr,
+            point.data());
+      } else {
+        problem_->SetParameterBlockConstant(point.data());
+      }
+    }
+    ceres::Solver::Options how;
+    how.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    how.max_num_iterations = 200;
+    how.function_tolerance = 1e-14;
+    how.parameter_tolerance = 1e-14;
+    how.gradient_tolerance = 1e-14;
+    how.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(how, &*problem_, &summary);
+    if (!summary.IsSolutionUsable()) return job_failed("calibration: the adjustment came to no solution");
+    find_residuals();
+    return {};
+  }
+
+  void find_residuals() {
+    for (Observation& o : observations_) {
+      const ReprojectionError error{o.point.at, 1.0, start_.normalizer_px(), start_.distortion.r0};
+      if (!error(interior_.data(), turns_[o.image].data(), centers_[o.image].data(), points_[o.point.id].data(),
+                 o.residual_px.data()))
+        o.residual_px.setConstant(1e6);  // behind the camera
+    }
+  }
+
+  // Which targets fit; whether that has changed.
+  bool choose() {
+    std::vector<double> sizes;
+    for (const Observation& o : observations_) {
+      if (!o.used) continue;
+      for (const double r : {o.residual_px.x(), o.residual_px.y()}) sizes.push_back(std::abs(r) / o.sigma_px);
+    }
+    if (sizes.empty()) return false;
+    const double sigmas = 1.4826 * median(sizes) * config_.reject_sigmas;
+    bool changed = !chosen_;
+    chosen_ = true;
+    for (Observation& o : observations_) {
+      const bool used = o.residual_px.norm() < std::max(config_.reject_floor_px, sigmas * o.sigma_px);
+      changed |= used != o.used;
+      o.used = used;
+    }
+    return changed;
+  }
+
+  Result<void> check() const {
+    std::vector<int> used(images_.size(), 0), known(images_.size(), 0);
+    for (const Observation& o : observations_) ++known[o.image], used[o.image] += o.used ? 1 : 0;
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      if (used[i] >= config_.min_targets && used[i] >= (1.0 - config_.max_rejected_share) * known[i]) continue;
+      return invalid_input(
+          "{}: only {} of its {} targets fit the camera that the other images show; is it from another camera or "
+          "focus, or has the field changed? Leave it out or calibrate it alone",
+          images_[i].name, used[i], known[i]);
+    }
+    const double found = interior_[0] / start_.focal_length_px;
+    if (std::abs(found - 1.0) > config_.max_focal_difference)
+      return invalid_input(
+          "calibration: found a focal length of {:.1f} px, but {:.1f} px were stated; check --pixel-pitch-um, "
+          "--focal-length-mm and the unit of the field (mm)",
+          interior_[0], start_.focal_length_px);
+    return {};
+  }
+
+  Result<Calibration> describe() {
+    Calibration result;
+    CameraModel& camera = result.camera = start_;
+    camera.focal_length_px = interior_[0];
+    camera.principal_point = {interior_[1], interior_[2]};
+    std::copy_n(interior_.data() + 3, 3, camera.distortion.radial.begin());
+    std::copy_n(interior_.data() + 6, 2, camera.distortion.tangential.begin());
+    std::copy_n(interior_.data() + 8, 2, camera.distortion.affine.begin());
+    double squares = 0.0, weighted = 0.0;
+    std::map<int, bool> seen;
+    for (const Observation& o : observations_) {
+      result.residuals.push_back({o.image, o.point.id, o.point.at, o.residual_px.x(), o.residual_px.y(), o.used});
+      if (!o.used) continue;
+      squares += o.residual_px.squaredNorm();
+      weighted += (o.residual_px / o.sigma_px).squaredNorm();
+      ++result.observations;
+    }
+    result.reprojection_rms_px = std::sqrt(squares / result.observations);
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      CameraPose pose;
+      pose.R_cam_world = rotation_from_vector(Eigen::Vector3d::Map(turns_[i].data()));
+      pose.center_world_mm = Eigen::Vector3d::Map(centers_[i].data());
+      result.poses.push_back(pose);
+    }
+    const int freedom = 2 * result.observations - kInteriorTerms - 6 * static_cast<int>(images_.size());
+    if (freedom < 1)
+      return invalid_input("calibration: {} targets in {} images do not determine a camera; take more images",
+                           result.observations, images_.size());
+    ceres::Covariance::Options how;
+    how.algorithm_type = ceres::SPARSE_QR;
+    ceres::Covariance covariance(how);
+    Eigen::Matrix<double, kInteriorTerms, kInteriorTerms, Eigen::RowMajor> block;
+    const std::vector<std::pair<const double*, const double*>> wanted{{interior_.data(), interior_.data()}};
+    if (!covariance.Compute(wanted, &*problem_) ||
+        !covariance.GetCovarianceBlock(interior_.data(), interior_.data(), block.data()))
+      return invalid_input(
+          "calibration: the images leave {} open; take some with the camera rolled by 90 deg and the "
+          "field seen aslant",
+          "the camera's constants");
+    result.covariance = block * weighted / freedom;
+    warn_of_correlations(result);
+    return result;
+  }
+
+  void warn_of_correlations(Calibration& result) const {
+    for (int i = 0; i < kInteriorTerms; ++i) {
+      for (int j = 0; j < i; ++j) {
+        // The radial terms are powers of the same radius: they always go together.
+        if (i >= 3 && i < 6 && j >= 3) continue;
+        const double c = result.covariance(i, j) / std::sqrt(result.covariance(i, i) * result.covariance(j, j));
+        if (std::abs(c) < config_.warn_correlation) continue;
+        result.warnings.push_back(fmt::format(
+            "{} and {} cannot be told apart (correlation {:+.3f}); add images rolled by 90 deg and views aslant",
+            kInteriorNames[static_cast<std::size_t>(j)], kInteriorNames[static_cast<std::size_t>(i)], c));
+      }
+    }
+  }
+
+  CameraModel start_;
+  const std::vector<CalibrationImage>& images_;
+  const TargetField& field_;
+  CalibrateConfig config_;
+  std::array<double, kInteriorTerms> interior_{};
+  std::vector<std::array<double, 3>> turns_, centers_;
+  std::map<int, std::array<double, 3>> points_;
+  std::vector<Observation> observations_;
+  std::optional<ceres::Problem> problem_;
+  bool chosen_ = false;
+};
+
+// Smallest extent of the targets over their largest: 0 on a line.
+double second_extent(const std::vector<CalibrationImage>& images, const TargetField& field) {
+  std::map<int, Eigen::Vector3d> seen;
+  for (const CalibrationImage& image : images)
+    for (const PointObservation& point : image.points)
+      if (const auto it = field.targets.find(point.id); it != field.targets.end())
+        seen[it->first] = it->second.p_world_mm;
+  if (seen.size() < 3) return 0.0;
+  Eigen::MatrixXd points(static_cast<Eigen::Index>(seen.size()), 3);
+  Eigen::Index row = 0;
+  for (const auto& [id, p] : seen) points.row(row++) = p.transpose();
+  points.rowwise() -= points.colwise().mean().eval();
+  const Eigen::Vector3d extents = Eigen::JacobiSVD<Eigen::MatrixXd>(points).singularValues();
+  return extents[0] > 0.0 ? extents[1] / extents[0] : 0.0;
+}
+
+}  // namespace
+
+Result<void> CalibrateConfig::validate() const {
+  if (!(noise_floor_px > 0.0) || !(reject_sigmas > 0.0) || !(reject_floor_px >= 0.0))
+    return invalid_input("calibrate: noise_floor_px and reject_sigmas above 0 expected, reject_floor_px at least 0");
+  if (min_targets < 4) return invalid_input("calibrate.min_targets: at least 4 expected, found {}", min_targets);
+  if (!(max_rejected_share > 0.0 && max_rejected_share < 1.0) || !(max_focal_difference > 0.0))
+    return invalid_input("calibrate: shares above 0 (and max_rejected_share below 1) expected");
+  return {};
+}
+
+Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector<CalibrationImage>& images,
+                                     const TargetField& field, const CalibrateConfig& config) {
+  if (images.empty()) return invalid_input("calibration: expected images, found none");
+  for (const CalibrationImage& image : images) {
+    const auto known = std::count_if(image.points.begin(), image.points.end(),
+                                     [&](const PointObservation& p) { return field.targets.count(p.id) > 0; });
+    if (known < config.min_targets)
+      return job_failed("{}: shows {} targets of the field, at least {} are needed; leave it out", image.name, known,
+                        config.min_targets);
+  }
+  constexpr double kOnALine = 0.02;
+  if (second_extent(images, field) < kOnALine)
+    return invalid_input("calibration: the targets seen stand on one line; spread them over the image and in depth");
+  return Adjustment(start, images, field, config).run();
+}
+
+}  // namespace imprint

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lib/camera/camera_model.h"
+#include "lib/camera/camera_pose.h"
+#include "lib/result/result.h"
+#include "lib/targets/target_field.h"
+
+namespace imprint {
+
+/// The constants of a camera that a calibration finds, in the order of its covariance.
+inline constexpr std::array<std::string_view, 10> kInteriorNames{
+    "focal_length_px", "principal_point_x_px", "principal_point_y_px", "A1", "A2", "A3", "B1", "B2", "C1", "C2"};
+inline constexpr int kInteriorTerms = static_cast<int>(kInteriorNames.size());
+using InteriorMatrix = Eigen::Matrix<double, kInteriorTerms, kInteriorTerms>;
+
+struct CalibrateConfig {
+  double noise_floor_px = 0.01;     ///< added to each centre's sigma: what a detector does not know of itself (ours)
+  double reject_sigmas = 4.5;       ///< a target is left out beyond this many robust standard deviations (ours)
+  double reject_floor_px = 0.1;     ///< and no nearer than this: of exact centres nothing is to be left out (ours)
+  int min_targets = 6;              ///< of one image (ours)
+  double max_rejected_share = 0.5;  ///< of an image's targets, above which the image belongs to something else (ours)
+  double max_focal_difference = 0.25;  ///< of the focal length found from the one stated (ours)
+  double warn_correlation = 0.98;      ///< between constants, above which the images do not separate them (ours)
+
+  [[nodiscard]] Result<void> validate() const;
+};
+
+/// A coded target's centre in one image.
+struct PointObservation {
+  int id = 0;
+  ObservedPoint at;
+  double sigma_px = 0.0;
+};
+
+struct CalibrationImage {
+  std::string name;  ///< for messages
+  CameraPose start;
+  std::vector<PointObservation> points;
+};
+
+struct CalibrationResidual {
+  std::size_t image = 0;
+  int id = 0;
+  ObservedPoint at;
+  double dx_px = 0.0;  ///< observed minus projected
+  double dy_px = 0.0;
+  bool used = false;
+};
+
+struct Calibration {
+  CameraModel camera;
+  InteriorMatrix covariance = InteriorMatrix::Zero();  ///< of kInteriorNames, scaled by the residuals found
+  std::vector<CameraPose> poses;                       ///< one an image
+  std::vector<CalibrationResidual> residuals;          ///< of every target that the field knows
+  double reprojection_rms_px = 0.0;                    ///< root mean square of the residual's length, used targets
+  int observations = 0;                                ///< used targets over all images
+  std::vector<std::string> warnings;
+
+  [[nodiscard]] double ci95(int term) const { return 1.96 * std::sqrt(std::max(0.0, covariance(term, term))); }
+};
+
+/// Interior orientation from several images of a known field at once, [B] 2.3 equations 1 to 5: least squares on the
+/// reprojection error over the camera's ten constants, one pose an image and, where the field states a sigma, the
+/// targets' coordinates. Robust first, then least squares over the targets that fit.
+/// `start`: image size, pixel pitch, nominal focal length and principal point. Fails (invalid_input) when an image does
+/// not belong to the others or to the camera stated, or when the images leave a constant open; says which.
+Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector<CalibrationImage>& images,
+                                     const TargetField& field, const CalibrateConfig& config);
+
+}  // namespace imprint
