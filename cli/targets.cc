@@ -1,5 +1,6 @@
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -187,6 +188,11 @@ void add_detect(Cli& cli, CLI::App& targets) {
       ->capture_default_str();
   command->add_option("--max-dot-px", options->config.max_dot_px, "largest mean diameter of a dot")
       ->capture_default_str();
+  const std::map<std::string, Decoder> decoders{{"likelihood", Decoder::likelihood}, {"plain", Decoder::plain}};
+  command
+      ->add_option("--decoder", options->config.decoder,
+                   "likelihood, or plain: thresholds and no error correction, for comparison")
+      ->transform(CLI::CheckedTransformer(decoders).description(""));
   command->add_option("--debug-image", options->debug_image,
                       "PNG to write: what was found, and what was rejected and why");
   command->add_option("IMAGE", options->images, "PNG or TIFF, 8 or 16 bit")->required();

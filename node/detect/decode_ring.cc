@@ -164,6 +164,18 @@ DecodedRing RingDecoder::decode(RingScan& scan) const {
   return ring;
 }
 
+DecodedRing RingDecoder::decode_plainly(const RingScan& scan) const {
+  DecodedRing ring;
+  for (int i = 0; i < bits_; ++i)
+    ring.code = ring.code << 1U | (scan.reading[static_cast<std::size_t>(i)] > 0.5 ? 1U : 0U);
+  const auto known = std::find_if(codes_.begin(), codes_.end(), [&](const TargetCode& code) {
+    return smallest_rotation(code.code, bits_) == smallest_rotation(ring.code, bits_);
+  });
+  ring.accepted = known != codes_.end();
+  if (ring.accepted) ring.id = known->id;
+  return ring;
+}
+
 DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   const StretchTables tables(scan, bits_);
   Match best;

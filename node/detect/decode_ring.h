@@ -33,6 +33,10 @@ class RingDecoder {
   /// ruled out by two bits or more; and when the known bits fit well.
   [[nodiscard]] DecodedRing decode(RingScan& scan) const;
 
+  /// The code that the bits are when each is taken for white above the middle between black and white; accepted when
+  /// it is in the library as read. No error is corrected, none is noticed.
+  [[nodiscard]] DecodedRing decode_plainly(const RingScan& scan) const;
+
   /// Fewest and most white bits of a ring that could be accepted.
   [[nodiscard]] int least_white() const { return least_white_; }
   [[nodiscard]] int most_white() const { return most_white_; }

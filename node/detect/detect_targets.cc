@@ -232,10 +232,12 @@ class TargetSearch {
     if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return {Rejection::poor_ellipse, {}, {}};
     auto scan = scan_ring(pyramid_, dot, library_.bits, library_.geometry, noise_, config_.max_unknown);
     if (!scan) return {Rejection::outside, {}, {}};
-    const DecodedRing ring = decoder_.decode(*scan);
+    const bool plain = config_.decoder == Decoder::plain;
+    const DecodedRing ring = plain ? decoder_.decode_plainly(*scan) : decoder_.decode(*scan);
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scan, ring});
     const bool accepted =
-        ring.accepted && !is_doubtful(dot, ring) && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits);
+        ring.accepted &&
+        (plain || (!is_doubtful(dot, ring) && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits)));
     return {accepted ? Rejection::none : Rejection::no_code, std::move(*scan), ring};
   }
 
