@@ -79,7 +79,7 @@ int run_edges(const EdgesOptions& options, bool as_json) {
     return fail({ErrorKind::invalid_input,
                  fmt::format("{}: has no camera \"{}\", only {}", options.rig.string(), options.camera_id, ids)});
   }
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = rig->warnings;
   const auto frame = read_image(options.image, &warnings);
   if (!frame) return fail(frame.error());
   const ProcessedFrame processed = process_frame(*frame, *camera, *rig, *method);

@@ -84,7 +84,9 @@ Result<Measurement> measure(const MeasureOptions& options) {
     observations.push_back(std::move(*observation));
   }
   auto measurement = fuse(observations, rig->forging, options.session.stem().string(), options.method);
-  if (measurement) measurement->made_at = utc_text(wall_clock_ns());
+  if (!measurement) return measurement;
+  measurement->warnings.insert(measurement->warnings.begin(), rig->warnings.begin(), rig->warnings.end());
+  measurement->made_at = utc_text(wall_clock_ns());
   return measurement;
 }
 

@@ -50,13 +50,13 @@ void print(const std::string& camera, const Resection& resection) {
 }
 
 int run_resect(const ResectOptions& options, bool as_json) {
-  const auto camera = read_camera_file(options.camera);
+  std::vector<std::string> warnings;
+  const auto camera = read_camera_file(options.camera, &warnings);
   if (!camera) return fail(camera.error());
   const auto library = read_target_library(options.library);
   if (!library) return fail(library.error());
   const auto field = read_target_field(options.field);
   if (!field) return fail(field.error());
-  std::vector<std::string> warnings;
   const auto frame = read_image(options.image, &warnings);
   if (!frame) return fail(frame.error());
   for (const std::string& warning : warnings) std::cerr << "imprint: warning: " << warning << '\n';

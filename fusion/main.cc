@@ -56,6 +56,7 @@ Result<void> run(const ProgramOptions& options) {
     return {};
   }
   if (auto opened = open_log("imprint-fusion", config->log_level); !opened) return opened;
+  for (const std::string& warning : rig->warnings) spdlog::warn("{}", warning);
   const auto store = SessionStore::open(config->database);
   if (!store) return pass_on(store.error());
 

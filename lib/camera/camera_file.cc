@@ -2,13 +2,12 @@
 
 #include <algorithm>
 
+#include "lib/camera/camera_yaml.h"
 #include "lib/config/atomic_file.h"
 #include "lib/config/toml_file.h"
 
 namespace imprint {
 namespace {
-
-constexpr int kLargestSide_px = 32767;  // what 16-bit image coordinates hold; also keeps memory bounded
 
 void check(const CameraModel& camera, TomlReader& read) {
   for (const auto& [key, value] :
@@ -17,8 +16,7 @@ void check(const CameraModel& camera, TomlReader& read) {
       read.fault(key, fmt::format("expected 1 to {}, found {}", kLargestSide_px, value));
     }
   }
-  constexpr std::string_view kAllowed = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
-  if (camera.id.empty() || camera.id.find_first_not_of(kAllowed) != std::string::npos) {  // it becomes part of a key
+  if (!is_camera_name(camera.id)) {
     read.fault("camera.id", fmt::format("expected a name of letters, digits, _ and -, found \"{}\"", camera.id));
   }
   if (!(camera.pixel_pitch_um > 0)) {
@@ -31,7 +29,13 @@ void check(const CameraModel& camera, TomlReader& read) {
 
 }  // namespace
 
-Result<CameraModel> read_camera_file(const std::filesystem::path& path) {
+bool is_camera_name(std::string_view id) {
+  constexpr std::string_view kAllowed = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+  return !id.empty() && id.find_first_not_of(kAllowed) == std::string_view::npos;
+}
+
+Result<CameraModel> read_camera_file(const std::filesystem::path& path, std::vector<std::string>* warnings) {
+  if (is_yaml_name(path)) return read_camera_yaml(path, warnings);
   const auto table = parse_toml_file(path);
   if (!table) return pass_on(table.error());
   TomlReader read(path, *table);

@@ -36,7 +36,8 @@ ForgingSpec read_forging(TomlReader& read) {
   return forging;
 }
 
-Result<std::vector<CameraModel>> read_cameras(const std::filesystem::path& path, TomlReader& read) {
+Result<std::vector<CameraModel>> read_cameras(const std::filesystem::path& path, TomlReader& read,
+                                              std::vector<std::string>& warnings) {
   std::vector<CameraModel> cameras;
   int number = 0;
   for (const toml::table* entry : read.tables("camera")) {
@@ -44,7 +45,7 @@ Result<std::vector<CameraModel>> read_cameras(const std::filesystem::path& path,
     const auto id = read_entry.string("id");
     const auto file = read_entry.path("calibration");
     if (read_entry.error()) return pass_on(*read_entry.error());
-    auto camera = read_camera_file(file);
+    auto camera = read_camera_file(file, &warnings);
     if (!camera) return pass_on(camera.error());
     if (camera->id != id) {
       return invalid_input("{}: camera \"{}\" names the calibration {}, which is of camera \"{}\"", path.string(), id,
@@ -77,7 +78,7 @@ Result<Rig> read_rig(const std::filesystem::path& path) {
   const auto library_path = read.path("library");
   Rig rig;
   rig.forging = read_forging(read);
-  auto cameras = read_cameras(path, read);
+  auto cameras = read_cameras(path, read, rig.warnings);
   if (read.error()) return pass_on(*read.error());
   if (!cameras) return pass_on(cameras.error());
   rig.cameras = std::move(*cameras);

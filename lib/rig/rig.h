@@ -31,6 +31,7 @@ struct Rig {
   TargetLibrary library;
   std::vector<CameraModel> cameras;  ///< in the file's order; ids unique
   ForgingSpec forging;
+  std::vector<std::string> warnings;  ///< of files that could be read, but not exactly
 
   [[nodiscard]] const CameraModel* find_camera(std::string_view id) const;
 };
