@@ -1,16 +1,18 @@
-#include <chrono>
 #include <filesystem>
 
-#include <fmt/chrono.h>
 #include <fmt/core.h>
 
+#include "cli/calibration_sheet.h"
+#include "cli/calibration_start.h"
 #include "cli/command.h"
-#include "lib/adjust/calibrate.h"
+#include "lib/adjust/calibration_review.h"
 #include "lib/camera/camera_file.h"
+#include "lib/camera/camera_yaml.h"
+#include "lib/camera/opencv_camera.h"
+#include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
 #include "node/capture/image_file.h"
 #include "node/detect/detect_config.h"
-#include "node/resect/resect.h"
 
 namespace imprint {
 namespace {
@@ -21,6 +23,7 @@ struct CalibrateOptions {
   fs::path library, field, out;
   std::string id;
   double pixel_pitch_um = 0.0, focal_length_mm = 0.0;
+  bool export_yaml = false;
   std::vector<fs::path> images;
 };
 
@@ -34,21 +37,6 @@ CameraModel nominal_camera(const CalibrateOptions& options, const cv::Size& size
   camera.focal_length_px = 1000.0 * options.focal_length_mm / options.pixel_pitch_um;
   camera.principal_point = {0.5 * (size.width - 1), 0.5 * (size.height - 1)};
   return camera;
-}
-
-// Rough: the lens's distortion is not known yet.
-Result<CameraPose> rough_pose(const CameraModel& camera, const std::vector<DetectedTarget>& targets,
-                              const TargetField& field) {
-  ResectConfig config;
-  config.max_residual_px = 0.02 * camera.normalizer_px();
-  const auto resection = resect(camera, targets, field, config);
-  if (!resection) return pass_on(resection.error());
-  return resection->pose;
-}
-
-bool fits_mirrored(const CameraModel& camera, const std::vector<DetectedTarget>& targets, TargetField field) {
-  for (auto& [id, target] : field.targets) target.p_world_mm.x() *= -1.0;
-  return rough_pose(camera, targets, field).has_value();
 }
 
 struct Loaded {
@@ -72,16 +60,8 @@ Result<Loaded> load(const CalibrateOptions& options, const TargetLibrary& librar
                            loaded.camera.height_px);
     }
     const auto targets = detect_targets(frame->image, library, DetectConfig{});
-    const auto pose = rough_pose(loaded.camera, targets, field);
-    if (!pose) {
-      const bool mirrored = fits_mirrored(loaded.camera, targets, field);
-      return pass_on(
-          Error{pose.error().kind,
-                fmt::format("{}: {}{}", path.string(), pose.error().message,
-                            mirrored ? fmt::format("; it would fit the mirror image of {}: check the sign of its axes",
-                                                   options.field.string())
-                                     : "")});
-    }
+    const auto pose = calibration_start(loaded.camera, targets, field);
+    if (!pose) return pass_on(Error{pose.error().kind, fmt::format("{}: {}", path.string(), pose.error().message)});
     CalibrationImage image{path.string(), *pose, {}};
     for (const DetectedTarget& target : targets) image.points.push_back({target.id, target.center, target.sigma_px});
     loaded.images.push_back(std::move(image));
@@ -99,10 +79,6 @@ std::pair<double, int> image_fit(const Calibration& calibration, std::size_t ima
     ++used;
   }
   return {used > 0 ? std::sqrt(squares / used) : 0.0, used};
-}
-
-std::string reason(const CalibrationResidual& r) {
-  return fmt::format("{:.2f} px off: wrong id, dirty or moved", std::hypot(r.dx_px, r.dy_px));
 }
 
 nlohmann::json describe(const Calibration& calibration, const std::vector<CalibrationImage>& images) {
@@ -133,7 +109,11 @@ nlohmann::json describe(const Calibration& calibration, const std::vector<Calibr
     json["images"].push_back({{"image", images[i].name}, {"rms_px", rms}, {"targets", used}});
   }
   for (const CalibrationResidual& r : calibration.residuals)
-    if (!r.used) json["rejected"].push_back({{"image", images[r.image].name}, {"id", r.id}, {"reason", reason(r)}});
+    if (!r.used)
+      json["rejected"].push_back(
+          {{"image", images[r.image].name}, {"id", r.id}, {"reason", rejection_reason(calibration, r)}});
+  for (const UnknownTarget& u : calibration.unknown)
+    json["rejected"].push_back({{"image", images[u.image].name}, {"id", u.id}, {"reason", "not in the field"}});
   json["warnings"] = calibration.warnings;
   return json;
 }
@@ -158,19 +138,46 @@ void print(const Calibration& calibration, const std::vector<CalibrationImage>& 
     fmt::print("  {}: {} targets, RMS {:.4f} px\n", images[i].name, used, rms);
   }
   for (const CalibrationResidual& r : calibration.residuals)
-    if (!r.used) fmt::print("  left out: {} target {}: {}\n", images[r.image].name, r.id, reason(r));
+    if (!r.used)
+      fmt::print("  left out: {} target {}: {}\n", images[r.image].name, r.id, rejection_reason(calibration, r));
+  for (const UnknownTarget& u : calibration.unknown)
+    fmt::print("  left out: {} target {}: not in the field\n", images[u.image].name, u.id);
 }
 
 // What a reader of the camera does not need but an auditor asks for.
-std::string calibration_record(const Calibration& calibration, std::size_t images) {
+std::string calibration_record(const Calibration& calibration, std::size_t images, const std::string& made_at) {
   std::string text = fmt::format(
-      "[calibration]\ndate = {:%Y-%m-%dT%H:%M:%SZ}\nreprojection_rms_px = {:.5f}\nobservations = {}\nimages = {}\n"
+      "[calibration]\ndate = {}\nreprojection_rms_px = {:.5f}\nobservations = {}\nimages = {}\n"
       "[calibration.ci95]\n",
-      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())),
-      calibration.reprojection_rms_px, calibration.observations, images);
+      made_at, calibration.reprojection_rms_px, calibration.observations, images);
   for (int i = 0; i < kInteriorTerms; ++i)
     text += fmt::format("{} = {:.6e}\n", kInteriorNames[static_cast<std::size_t>(i)], calibration.ci95(i));
   return text;
+}
+
+// The files beside camN.toml: plot, record and, where asked for, the camera for other programs.
+Result<std::vector<fs::path>> write_beside(const CalibrateOptions& options, const CalibrationSheet& sheet) {
+  const fs::path stem = fs::path(options.out).replace_extension();
+  std::vector<fs::path> written;
+  const auto write = [&](const std::string& ending, const std::string& bytes) {
+    written.push_back(stem.string() + ending);
+    return write_file_atomically(written.back(), bytes);
+  };
+  const auto plot = draw_residuals_png(sheet);
+  if (!plot) return pass_on(plot.error());
+  const auto record = draw_record_pdf(sheet);
+  if (!record) return pass_on(record.error());
+  if (auto done = write("_residuals.png", *plot); !done) return pass_on(done.error());
+  if (auto done = write("_record.pdf", *record); !done) return pass_on(done.error());
+  if (!options.export_yaml) return written;
+  const CameraModel& camera = sheet.calibration.camera;
+  if (auto done = write("_opencv.yaml", camera_as_opencv_yaml(camera)); !done) return pass_on(done.error());
+  if (auto done = write("_ros.yaml", camera_as_ros_yaml(camera)); !done) return pass_on(done.error());
+  if (const double error_px = to_opencv(camera).max_error_px; error_px > 0.001)
+    std::cerr << fmt::format(
+        "imprint: warning: OpenCV's model has no shear (C2): the exported cameras differ from {} by up to {:.3f} px\n",
+        options.out.string(), error_px);
+  return written;
 }
 
 int run_calibrate(const CalibrateOptions& options, bool as_json) {
@@ -187,11 +194,19 @@ int run_calibrate(const CalibrateOptions& options, bool as_json) {
   const auto calibration = calibrate_camera(loaded->camera, loaded->images, *field, CalibrateConfig{});
   if (!calibration) return fail(calibration.error());
   for (const std::string& warning : calibration->warnings) std::cerr << "imprint: warning: " << warning << '\n';
-  const auto written =
-      write_camera_file(calibration->camera, options.out, calibration_record(*calibration, loaded->images.size()));
+  const std::string made_at = utc_text(wall_clock_ns());
+  const auto written = write_camera_file(calibration->camera, options.out,
+                                         calibration_record(*calibration, loaded->images.size(), made_at));
   if (!written) return fail(written.error());
-  if (as_json) return print_json(describe(*calibration, loaded->images));
+  const auto beside = write_beside(options, {*calibration, loaded->images, *field, options.field.string(), made_at});
+  if (!beside) return fail(beside.error());
+  if (as_json) {
+    auto json = describe(*calibration, loaded->images);
+    for (const fs::path& path : *beside) json["files"].push_back(path.string());
+    return print_json(json);
+  }
   print(*calibration, loaded->images);
+  for (const fs::path& path : *beside) fmt::print("  {}\n", path.string());
   return 0;
 }
 
@@ -207,6 +222,7 @@ void add_calibrate_command(Cli& cli) {
   command->add_option("--focal-length-mm", options->focal_length_mm, "as engraved on the lens")->required();
   command->add_option("--id", options->id, "name of the camera, part of its keys on the network")->required();
   command->add_option("--out", options->out, "camN.toml to write")->required();
+  command->add_flag("--export", options->export_yaml, "write the camera as OpenCV and ROS YAML too, beside it");
   command->add_option("images", options->images, "PNG or TIFF, all of one camera at one focus")->required();
 }
 

@@ -7,8 +7,9 @@
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
-#include <Eigen/SVD>
+#include <fmt/ranges.h>
 
+#include "lib/adjust/calibration_review.h"
 #include "lib/camera/balanced_distortion.h"
 #include "lib/geometry/rotation.h"
 
@@ -45,6 +46,11 @@ struct FieldError {
   }
 };
 
+struct OwnFocalLength {
+  std::size_t image = 0;
+  double value_px = 0.0, sigma_px = 0.0;
+};
+
 struct Observation {
   std::size_t image = 0;
   PointObservation point;
@@ -73,7 +79,10 @@ class Adjustment {
       centers_.push_back(center);
       for (const PointObservation& point : image.points) {
         const auto target = field.targets.find(point.id);
-        if (target == field.targets.end()) continue;
+        if (target == field.targets.end()) {
+          unknown_.push_back({centers_.size() - 1, point.id});
+          continue;
+        }
         std::copy_n(target->second.p_world_mm.data(), 3, points_[point.id].data());
         observations_.push_back({.image = centers_.size() - 1,
                                  .point = point,
@@ -85,6 +94,7 @@ class Adjustment {
   Result<Calibration> run() {
     // Robust first; then least squares over what fits, until it is the same targets.
     if (auto solved = solve(true); !solved) return pass_on(solved.error());
+    if (auto one = check_one_camera(); !one) return pass_on(one.error());
     for (int round = 0; round < 6 && choose(); ++round)
       if (auto solved = solve(false); !solved) return pass_on(solved.error());
     if (auto plausible = check(); !plausible) return pass_on(plausible.error());
@@ -157,6 +167,73 @@ class Adjustment {
     return changed;
   }
 
+  // The focal length that one image shows by itself, the other constants given; nothing where it cannot tell.
+  std::optional<OwnFocalLength> own_focal_length(std::size_t image) {
+    std::array<double, kInteriorTerms> interior = interior_;
+    std::array<double, 3> turn = turns_[image], center = centers_[image];
+    ceres::Problem problem;
+    int count = 0;
+    for (const Observation& o : observations_) {
+      if (o.image != image) continue;
+      auto* cost = new ceres::AutoDiffCostFunction<ReprojectionError, 2, kInteriorTerms, 3, 3, 3>(
+          new ReprojectionError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
+      auto* loss = new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px));
+      double* point = points_[o.point.id].data();
+      problem.AddResidualBlock(cost, loss, interior.data(), turn.data(), center.data(), point);
+      problem.SetParameterBlockConstant(point);
+      ++count;
+    }
+    problem.SetManifold(interior.data(), new ceres::SubsetManifold(kInteriorTerms, {1, 2, 3, 4, 5, 6, 7, 8, 9}));
+    ceres::Solver::Options how;
+    how.max_num_iterations = 100;
+    how.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(how, &problem, &summary);
+    ceres::Covariance::Options exact;
+    exact.algorithm_type = ceres::DENSE_SVD;
+    exact.min_reciprocal_condition_number = 1e-20;
+    ceres::Covariance covariance(exact);
+    const std::vector<std::pair<const double*, const double*>> wanted{{interior.data(), interior.data()}};
+    const int freedom = 2 * count - 7;
+    double variance = 0.0;
+    if (!summary.IsSolutionUsable() || freedom < 5 || !covariance.Compute(wanted, &problem) ||
+        !covariance.GetCovarianceBlockInTangentSpace(interior.data(), interior.data(), &variance))
+      return std::nullopt;
+    const double scale = std::max(1.0, 2.0 * summary.final_cost / freedom);
+    return OwnFocalLength{image, interior[0], std::sqrt(variance * scale)};
+  }
+
+  // Two lenses, or two settings of one, in the same set: each image's own focal length tells.
+  Result<void> check_one_camera() {
+    std::vector<OwnFocalLength> own;
+    for (std::size_t i = 0; i < images_.size(); ++i)
+      if (const auto found = own_focal_length(i)) own.push_back(*found);
+    if (own.size() < 2) return {};
+    std::ranges::sort(own, {}, &OwnFocalLength::value_px);
+    std::size_t split = 0;
+    double widest = 0.0;
+    for (std::size_t i = 0; i + 1 < own.size(); ++i) {
+      const double gap = own[i + 1].value_px - own[i].value_px;
+      const double sigma = std::hypot(own[i].sigma_px, own[i + 1].sigma_px);
+      if (gap < config_.mixed_focal_sigmas * sigma || gap < config_.mixed_focal_share * own[i].value_px) continue;
+      if (gap > widest) widest = gap, split = i + 1;
+    }
+    if (widest == 0.0) return {};
+    const auto describe_side = [&](auto begin, auto end) {
+      std::vector<OwnFocalLength> side(begin, end);
+      std::ranges::sort(side, {}, &OwnFocalLength::image);
+      std::vector<std::string> names;
+      double sum = 0.0;
+      for (const OwnFocalLength& one : side) names.push_back(images_[one.image].name), sum += one.value_px;
+      return fmt::format("{:.1f} px ({})", sum / static_cast<double>(side.size()), fmt::join(names, ", "));
+    };
+    const auto middle = own.begin() + static_cast<std::ptrdiff_t>(split);
+    return invalid_input(
+        "calibration: images of two cameras or focus settings are mixed: some show a focal length of {}, others of "
+        "{}; calibrate them apart",
+        describe_side(own.begin(), middle), describe_side(middle, own.end()));
+  }
+
   Result<void> check() const {
     std::vector<int> used(images_.size(), 0), known(images_.size(), 0);
     for (const Observation& o : observations_) ++known[o.image], used[o.image] += o.used ? 1 : 0;
@@ -185,7 +262,6 @@ class Adjustment {
     std::copy_n(interior_.data() + 6, 2, camera.distortion.tangential.begin());
     std::copy_n(interior_.data() + 8, 2, camera.distortion.affine.begin());
     double squares = 0.0, weighted = 0.0;
-    std::map<int, bool> seen;
     for (const Observation& o : observations_) {
       result.residuals.push_back({o.image, o.point.id, o.point.at, o.residual_px.x(), o.residual_px.y(), o.used});
       if (!o.used) continue;
@@ -216,22 +292,9 @@ class Adjustment {
           "field seen aslant",
           "the camera's constants");
     result.covariance = block * weighted / freedom;
-    warn_of_correlations(result);
+    result.unknown = unknown_;
+    result.warnings = separation_warnings(result, images_, field_, config_);
     return result;
-  }
-
-  void warn_of_correlations(Calibration& result) const {
-    for (int i = 0; i < kInteriorTerms; ++i) {
-      for (int j = 0; j < i; ++j) {
-        // The radial terms are powers of the same radius: they always go together.
-        if (i >= 3 && i < 6 && j >= 3) continue;
-        const double c = result.covariance(i, j) / std::sqrt(result.covariance(i, i) * result.covariance(j, j));
-        if (std::abs(c) < config_.warn_correlation) continue;
-        result.warnings.push_back(fmt::format(
-            "{} and {} cannot be told apart (correlation {:+.3f}); add images rolled by 90 deg and views aslant",
-            kInteriorNames[static_cast<std::size_t>(j)], kInteriorNames[static_cast<std::size_t>(i)], c));
-      }
-    }
   }
 
   CameraModel start_;
@@ -242,25 +305,10 @@ class Adjustment {
   std::vector<std::array<double, 3>> turns_, centers_;
   std::map<int, std::array<double, 3>> points_;
   std::vector<Observation> observations_;
+  std::vector<UnknownTarget> unknown_;
   std::optional<ceres::Problem> problem_;
   bool chosen_ = false;
 };
-
-// Smallest extent of the targets over their largest: 0 on a line.
-double second_extent(const std::vector<CalibrationImage>& images, const TargetField& field) {
-  std::map<int, Eigen::Vector3d> seen;
-  for (const CalibrationImage& image : images)
-    for (const PointObservation& point : image.points)
-      if (const auto it = field.targets.find(point.id); it != field.targets.end())
-        seen[it->first] = it->second.p_world_mm;
-  if (seen.size() < 3) return 0.0;
-  Eigen::MatrixXd points(static_cast<Eigen::Index>(seen.size()), 3);
-  Eigen::Index row = 0;
-  for (const auto& [id, p] : seen) points.row(row++) = p.transpose();
-  points.rowwise() -= points.colwise().mean().eval();
-  const Eigen::Vector3d extents = Eigen::JacobiSVD<Eigen::MatrixXd>(points).singularValues();
-  return extents[0] > 0.0 ? extents[1] / extents[0] : 0.0;
-}
 
 }  // namespace
 
@@ -284,7 +332,7 @@ Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector
                         config.min_targets);
   }
   constexpr double kOnALine = 0.02;
-  if (second_extent(images, field) < kOnALine)
+  if (field_extents(images, field)[1] < kOnALine)
     return invalid_input("calibration: the targets seen stand on one line; spread them over the image and in depth");
   return Adjustment(start, images, field, config).run();
 }

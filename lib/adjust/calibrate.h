@@ -28,7 +28,13 @@ struct CalibrateConfig {
   int min_targets = 6;              ///< of one image (ours)
   double max_rejected_share = 0.5;  ///< of an image's targets, above which the image belongs to something else (ours)
   double max_focal_difference = 0.25;  ///< of the focal length found from the one stated (ours)
+  double mixed_focal_sigmas = 6.0;     ///< an image's own focal length this far from the others': other camera (ours)
+  double mixed_focal_share = 0.002;    ///< and by no less than this share: a lens breathes with warmth (ours)
   double warn_correlation = 0.98;      ///< between constants, above which the images do not separate them (ours)
+  double warn_focal_share = 1e-3;      ///< 95 % half-width of the focal length worth a warning; [B] table 3: 6e-5
+  double warn_principal_point_share = 0.005;  ///< of half the image's shorter side; [B] table 3: 6e-4
+  double min_turn_deg = 20.0;  ///< of roll or viewing direction between images, for them to differ (ours)
+  double flat_share = 0.02;    ///< thickness over extent below which a field is flat (ours)
 
   [[nodiscard]] Result<void> validate() const;
 };
@@ -55,11 +61,17 @@ struct CalibrationResidual {
   bool used = false;
 };
 
+struct UnknownTarget {
+  std::size_t image = 0;
+  int id = 0;
+};
+
 struct Calibration {
   CameraModel camera;
   InteriorMatrix covariance = InteriorMatrix::Zero();  ///< of kInteriorNames, scaled by the residuals found
   std::vector<CameraPose> poses;                       ///< one an image
   std::vector<CalibrationResidual> residuals;          ///< of every target that the field knows
+  std::vector<UnknownTarget> unknown;                  ///< seen, but not in the field
   double reprojection_rms_px = 0.0;                    ///< root mean square of the residual's length, used targets
   int observations = 0;                                ///< used targets over all images
   std::vector<std::string> warnings;
