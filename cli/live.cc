@@ -123,6 +123,8 @@ Event imprint_event(const Imprint& imprint) {
        {"targets_used", imprint.quality.targets_used},
        {"reprojection_rms_px", imprint.quality.reprojection_rms_px},
        {"edge_coverage", imprint.quality.edge_coverage},
+       {"pose_state", pose_state_name(imprint.pose_state)},
+       {"pose_doubtful", imprint.pose_doubtful},
        {"failure", imprint.failure}},
       fmt::format("imprint  session {} observation {} {}: ", imprint.session, imprint.observation, imprint.camera_id) +
           (imprint.failure.empty()

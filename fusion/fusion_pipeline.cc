@@ -1,5 +1,6 @@
 #include "fusion/fusion_pipeline.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "fusion/combine/combine_config.h"
@@ -23,6 +24,37 @@ std::vector<CameraShare> shares_of_failed(const Observation& observation, const 
     shares.push_back(std::move(share));
   }
   return shares;
+}
+
+const Imprint* imprint_of(const Observation& observation, const std::string& camera) {
+  const auto found = std::ranges::find(observation.imprints, camera, &Imprint::camera_id);
+  return found == observation.imprints.end() ? nullptr : &*found;
+}
+
+// A camera found to have moved makes doubtful what it saw since it was last known to stand still.
+bool doubted_later(const std::vector<Observation>& observations, const Imprint& imprint) {
+  return std::ranges::any_of(observations, [&](const Observation& observation) {
+    const Imprint* later = imprint_of(observation, imprint.camera_id);
+    return later != nullptr && later->pose_doubtful_since_ns != 0 &&
+           imprint.sensor_time_ns > later->pose_doubtful_since_ns && imprint.sensor_time_ns <= later->sensor_time_ns;
+  });
+}
+
+void note_poses(const std::vector<Observation>& observations, std::vector<Measurement::Observation>& reports,
+                std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    for (CameraShare& share : reports[i].cameras) {
+      const Imprint* imprint = imprint_of(observations[i], share.id);
+      if (imprint == nullptr) continue;
+      share.pose_state = imprint->pose_state;
+      share.pose_doubtful = imprint->pose_doubtful || doubted_later(observations, *imprint);
+      if (share.pose_doubtful && !share.excluded)
+        warnings.push_back(fmt::format(
+            "observation {}: camera {}: its pose is doubtful ({})", reports[i].index, share.id,
+            imprint->pose_state == PoseState::hold ? "kept, and not confirmed by its targets, or found moved later"
+                                                   : "the camera had moved"));
+    }
+  }
 }
 
 }  // namespace
@@ -67,6 +99,7 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
     for (const auto& [id, why] : observations.front().missing) missing += fmt::format("; {}: {}", id, why);
     return job_failed("session {}: {}{}", session, first_failure, missing);
   }
+  note_poses(observations, reports, warnings);
   auto combined = combine(observed, rotations_deg, forging, CombineConfig{});
   if (!combined) return job_failed("session {}: {}", session, combined.error().message);
   combined->warnings.insert(combined->warnings.begin(), warnings.begin(), warnings.end());

@@ -58,10 +58,13 @@ Result<void> run(const ProgramOptions& options) {
     return {};
   }
   if (auto opened = open_log("imprint-node", config->log_level); !opened) return opened;
+  for (const std::string& warning : rig->warnings) spdlog::warn("{}", warning);
   auto transport = open_zenoh(config->zenoh);
   if (!transport) return pass_on(transport.error());
+  PoseKeeper keeper;  // called by the service's one worker alone
   NodeService service(
-      *config, **source, [&](const Frame& frame) { return process_frame(frame, *camera, *rig, *method); }, **transport);
+      *config, **source, [&](const Frame& frame) { return process_frame(frame, *camera, *rig, *method, &keeper); },
+      **transport);
   if (auto started = service.start(); !started) return started;
   spdlog::info("camera {} of {}/{} ready, frames from {} {}", config->camera_id, config->site, config->line,
                config->capture_source, config->capture_path.string());

@@ -5,6 +5,7 @@
 #include "node/detect/detect_config.h"
 #include "node/edge/edge_config.h"
 #include "node/imprint/filter_config.h"
+#include "node/pose/hot_air.h"
 #include "node/segment/segment_config.h"
 #include "node/segment/segment_prior.h"
 
@@ -35,12 +36,40 @@ Result<void> check_size(const Frame& frame, const CameraModel& camera) {
 }
 
 void note_resection(const Resection& resection, Imprint& imprint) {
-  imprint.pose = resection.pose;
+  imprint.quality.targets_used = 0;
   imprint.quality.reprojection_rms_px = resection.reprojection_rms_px;
   for (const ResectedTarget& target : resection.targets) imprint.quality.targets_used += target.used ? 1 : 0;
   for (const int id : resection.unknown_ids) {
     imprint.warnings.push_back(fmt::format("camera \"{}\": target {} is not in the field", imprint.camera_id, id));
   }
+}
+
+// The pose that the frame is measured with: its own, or the one kept for it. Fails where there is neither.
+Result<void> take_pose(const Frame& frame, bool forging_in_view, PoseKeeper* keeper, const Result<Resection>& own,
+                       Imprint& imprint) {
+  if (keeper == nullptr) {
+    if (!own) return pass_on(own.error());
+    imprint.pose = own->pose;
+    return {};
+  }
+  const auto kept =
+      keeper->update(own ? std::optional(own->pose) : std::nullopt, forging_in_view, frame.sensor_time_ns);
+  if (!kept) return pass_on(own.error());
+  imprint.pose = kept->pose;
+  imprint.pose_state = kept->state;
+  imprint.pose_doubtful = kept->doubtful;
+  imprint.pose_doubtful_since_ns = kept->doubtful_since_ns;
+  if (!kept->note.empty()) imprint.warnings.push_back(fmt::format("camera \"{}\": {}", imprint.camera_id, kept->note));
+  if (!own) imprint.warnings.push_back(own.error().message);
+  return {};
+}
+
+// Again, with less trust in targets beside the forging; the first pose has served to find it.
+Result<Resection> resect_in_hot_air(const CameraModel& camera, const Rig& rig, Result<Resection> first,
+                                    const std::vector<DetectedTarget>& targets, const Segmentation& forging) {
+  if (!first || rig.forging.polarity != Polarity::bright) return first;
+  auto again = resect(camera, weigh_hot_air(targets, forging, HotAirConfig{}), rig.field, ResectConfig{});
+  return again ? std::move(again) : std::move(first);
 }
 
 void note_silhouette(const Silhouette& silhouette, Imprint& imprint) {
@@ -59,7 +88,8 @@ void note_coverage(Imprint& imprint) {
 
 }  // namespace
 
-ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, const Rig& rig, EdgeMethod method) {
+ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, const Rig& rig, EdgeMethod method,
+                             PoseKeeper* keeper) {
   ProcessedFrame result;
   Imprint& imprint = result.imprint;
   imprint.camera_id = camera.id;
@@ -72,17 +102,27 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
   imprint.quality.targets_seen = static_cast<int>(result.targets.size());
 
   auto resection = timed(result, "resect", [&] { return resect(camera, result.targets, rig.field, ResectConfig{}); });
-  if (!resection) {
+  const auto kept = keeper != nullptr ? keeper->kept() : std::nullopt;
+  if (resection) {
+    imprint.pose = resection->pose;
+  } else if (kept) {
+    imprint.pose = *kept;
+  } else {
     return give_up(result, {resection.error().kind, fmt::format("{}: {}", frame.source, resection.error().message)});
   }
-  note_resection(*resection, imprint);
-  result.resection = std::move(*resection);
 
   const auto segmentation = timed(result, "segment", [&]() -> Result<Segmentation> {
     const auto prior = make_segment_prior(camera, imprint.pose, rig.forging, rig.field);
     if (!prior) return pass_on(prior.error());
     return segment_forging(frame.image, *prior, SegmentConfig{});
   });
+  if (segmentation) resection = resect_in_hot_air(camera, rig, std::move(resection), result.targets, *segmentation);
+  if (resection) {
+    note_resection(*resection, imprint);
+    result.resection = *resection;
+  }
+  if (auto posed = take_pose(frame, segmentation.has_value(), keeper, resection, imprint); !posed)
+    return give_up(result, {posed.error().kind, fmt::format("{}: {}", frame.source, posed.error().message)});
   if (!segmentation) {
     return give_up(result, {segmentation.error().kind, fmt::format("{}: camera \"{}\": {}", frame.source, camera.id,
                                                                    segmentation.error().message)});

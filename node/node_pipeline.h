@@ -12,6 +12,7 @@
 #include "node/capture/frame.h"
 #include "node/edge/locate_edges.h"
 #include "node/imprint/make_imprint.h"
+#include "node/pose/pose_keeper.h"
 #include "node/resect/resect.h"
 
 namespace imprint {
@@ -27,8 +28,10 @@ struct ProcessedFrame {
   std::vector<std::pair<std::string, std::chrono::microseconds>> stage_times;
 };
 
-/// One camera's frame through all stages: detect, resect, segment, edge, imprint.
-/// The only file that wires the stages; a pure call without clock (but for the stage times), file or global.
-ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, const Rig& rig, EdgeMethod method);
+/// One camera's frame through all stages: detect, resect, segment, pose, edge, imprint.
+/// The only file that wires the stages; a pure call without clock (but for the stage times), file or global: what it
+/// remembers is in `keeper`. Without one, or before that has a pose to keep, the frame's own resection is used.
+ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, const Rig& rig, EdgeMethod method,
+                             PoseKeeper* keeper = nullptr);
 
 }  // namespace imprint

@@ -121,7 +121,8 @@ Imprint NodeService::make_imprint(const Trigger& trigger) {
   try {
     auto frame = source_.capture({trigger.session, static_cast<int>(trigger.observation), trigger.rotation_deg});
     if (frame) {
-      if (frame->sensor_time_ns != 0) sensor_time_ns = frame->sensor_time_ns;
+      if (frame->sensor_time_ns == 0) frame->sensor_time_ns = sensor_time_ns;
+      sensor_time_ns = frame->sensor_time_ns;
       ProcessedFrame processed = process_(*frame);
       imprint = std::move(processed.imprint);
       if (processed.error && imprint.failure.empty()) imprint.failure = processed.error->message;
@@ -152,6 +153,7 @@ void NodeService::note(const Imprint& imprint) {
     health_.targets_seen = imprint.quality.targets_seen;
     health_.reprojection_rms_px = imprint.quality.reprojection_rms_px;
     health_.contrast = imprint.quality.contrast;
+    health_.pose_state = imprint.pose_state;
   }
   if (imprint.failure.empty()) {
     spdlog::info("session {} observation {}: imprint sent, {} targets, reprojection rms {:.3f} px, coverage {:.0f} %",

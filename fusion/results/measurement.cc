@@ -49,7 +49,9 @@ nlohmann::json camera_to_json(const CameraShare& camera) {
                          {"reprojection_rms_px", camera.reprojection_rms_px},
                          {"targets_used", camera.targets_used},
                          {"edge_points", camera.edge_points},
-                         {"excluded", camera.excluded}};
+                         {"excluded", camera.excluded},
+                         {"pose_state", pose_state_name(camera.pose_state)},
+                         {"pose_doubtful", camera.pose_doubtful}};
   if (!camera.reason.empty()) json["reason"] = camera.reason;
   return json;
 }
@@ -88,6 +90,8 @@ CameraShare camera_from_json(const nlohmann::json& json) {
   camera.edge_points = json.at("edge_points").get<int>();
   camera.excluded = json.at("excluded").get<bool>();
   camera.reason = json.value("reason", "");
+  camera.pose_state = pose_state_from(std::string_view(json.value("pose_state", std::string())));
+  camera.pose_doubtful = json.value("pose_doubtful", false);
   return camera;
 }
 

@@ -26,6 +26,7 @@ json health_json(const Health& health, double age) {
           {"targets_seen", health.targets_seen},
           {"reprojection_rms_px", health.reprojection_rms_px},
           {"contrast", health.contrast},
+          {"pose_state", pose_state_name(health.pose_state)},
           {"last_error", health.last_error},
           {"version", health.version}};
 }
@@ -42,6 +43,8 @@ json imprint_json(const Imprint& imprint, double age) {
           {"edge_coverage", imprint.quality.edge_coverage},
           {"saturated_fraction", imprint.quality.saturated_fraction},
           {"method", imprint.method},
+          {"pose_state", pose_state_name(imprint.pose_state)},
+          {"pose_doubtful", imprint.pose_doubtful},
           {"failure", imprint.failure},
           {"warnings", imprint.warnings}};
 }

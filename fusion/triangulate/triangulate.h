@@ -50,6 +50,8 @@ struct CameraShare {
   double reprojection_rms_px = 0.0;
   int targets_used = 0;
   int edge_points = 0;
+  PoseState pose_state = PoseState::tracking;
+  bool pose_doubtful = false;  ///< the camera had moved, or may have
   bool excluded = false;
   std::string reason;  ///< why excluded
 };

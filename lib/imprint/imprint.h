@@ -6,6 +6,7 @@
 
 #include "lib/camera/camera_pose.h"
 #include "lib/geometry/points.h"
+#include "lib/imprint/pose_state.h"
 
 namespace imprint {
 
@@ -65,6 +66,10 @@ struct Imprint {
   std::int64_t sensor_time_ns = 0;  ///< since the Unix epoch
   double focal_length_px = 0.0;
   CameraPose pose;
+  PoseState pose_state = PoseState::tracking;
+  bool pose_doubtful = false;  ///< the camera has moved, or its targets could not confirm the kept pose
+  /// Where not 0: the camera was last known to stand still then; what it saw later, to this frame, is doubtful too.
+  std::int64_t pose_doubtful_since_ns = 0;
   StationGrid grid;
   ImprintCurve upper;  ///< smaller offset
   ImprintCurve lower;  ///< larger offset

@@ -207,6 +207,9 @@ Result<Imprint> read_imprint(const v1::Imprint& message) {
   imprint.method = message.method();
   imprint.warnings.assign(message.warnings().begin(), message.warnings().end());
   imprint.failure = message.failure();
+  imprint.pose_state = pose_state_from(static_cast<int>(message.pose_state()));
+  imprint.pose_doubtful = message.pose_doubtful();
+  imprint.pose_doubtful_since_ns = message.pose_doubtful_since_ns();
   if (message.has_grid()) imprint.grid = read_grid(message.grid());
   imprint.start = read_end(message.start());
   imprint.end = read_end(message.end());
@@ -243,6 +246,9 @@ std::vector<std::uint8_t> encode_imprint(const Imprint& imprint) {
   message.set_focal_length_px(finite_or_zero(imprint.focal_length_px));
   fill_quality(*message.mutable_quality(), imprint.quality);
   message.set_method(wire_line(imprint.method, kMaxIdBytes));
+  message.set_pose_state(static_cast<v1::PoseState>(imprint.pose_state));
+  message.set_pose_doubtful(imprint.pose_doubtful);
+  message.set_pose_doubtful_since_ns(imprint.pose_doubtful_since_ns);
 
   const std::string fault = fault_of(imprint);
   const bool usable_pose = pose_fault(imprint.pose).empty();

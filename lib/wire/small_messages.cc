@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 
@@ -62,6 +63,7 @@ std::vector<std::uint8_t> encode_health(const Health& health) {
   message.set_contrast(wire_float(health.contrast));
   message.set_last_error(wire_line(health.last_error, kMaxErrorBytes));
   message.set_version(wire_line(health.version, kMaxVersionBytes));
+  message.set_pose_state(static_cast<std::uint32_t>(health.pose_state));
   return bytes_of(message);
 }
 
@@ -84,6 +86,7 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes) {
   health.contrast = message->contrast();
   health.last_error = message->last_error();
   health.version = message->version();
+  health.pose_state = pose_state_from(static_cast<int>(std::min(message->pose_state(), 3U)));
   return health;
 }
 

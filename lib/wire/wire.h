@@ -46,8 +46,9 @@ struct Health {
   int targets_seen = 0;
   double reprojection_rms_px = 0.0;
   double contrast = 0.0;
-  std::string last_error;  ///< one line, cut to 80 bytes; empty when the last frame was good
+  std::string last_error;                      ///< one line, cut to 80 bytes; empty when the last frame was good
   std::string version;
+  PoseState pose_state = PoseState::tracking;  ///< of the last frame
 };
 std::vector<std::uint8_t> encode_health(const Health& health);
 Result<Health> decode_health(std::span<const std::uint8_t> bytes);

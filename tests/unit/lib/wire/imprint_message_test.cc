@@ -83,6 +83,20 @@ TEST_CASE("imprint message: every field comes back") {
   CHECK(got.failure.empty());
 }
 
+TEST_CASE("imprint message: where the pose comes from goes with it, with curves and without") {
+  for (Imprint sent : {sample(), Imprint{}}) {
+    sent.camera_id = "cam1";
+    if (sent.upper.offset_px.empty()) sent.failure = "no forging";
+    sent.pose_state = imprint::PoseState::moved;
+    sent.pose_doubtful = true;
+    sent.pose_doubtful_since_ns = 1'700'000'000'123'456'789;
+    const Imprint got = there_and_back(sent);
+    CHECK(got.pose_state == imprint::PoseState::moved);
+    CHECK(got.pose_doubtful);
+    CHECK(got.pose_doubtful_since_ns == sent.pose_doubtful_since_ns);
+  }
+}
+
 TEST_CASE("imprint message: a frame without curves carries its reason") {
   Imprint sent;
   sent.camera_id = "cam1";

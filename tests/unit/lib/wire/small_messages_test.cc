@@ -38,7 +38,8 @@ TEST_CASE("health message: comes back whole in about 120 bytes") {
                     0.127,
                     0.41,
                     "frame 4800: 2 targets found, 4 needed",
-                    "0.1.0"};
+                    "0.1.0",
+                    imprint::PoseState::hold};
   const auto bytes = encode_health(sent);
   WARN("health: " << bytes.size() << " bytes");
   CHECK(bytes.size() <= 120);
@@ -55,6 +56,7 @@ TEST_CASE("health message: comes back whole in about 120 bytes") {
   CHECK(got->contrast == Approx(sent.contrast).epsilon(1e-7));
   CHECK(got->last_error == sent.last_error);
   CHECK(got->version == sent.version);
+  CHECK(got->pose_state == imprint::PoseState::hold);
 }
 
 TEST_CASE("health message: a long error is cut to 80 bytes") {

@@ -109,6 +109,44 @@ TEST_CASE("resect: with 30 % of the ids wrong the pose is the same and the wrong
   }
 }
 
+TEST_CASE("resect: of ten targets three with wrong ids are listed and leave the pose to the others") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Setup setup(10, seed);
+    const auto right = setup.detect(0.02, seed);
+    auto detected = right;
+    std::swap(detected[2].id, detected[5].id);
+    detected[8].id = detected[0].id;  // twice the same id: one of the two must be wrong
+    const auto result = resect(setup.camera, detected, setup.field, ResectConfig{});
+    REQUIRE(result);
+    auto good = right;
+    for (const std::size_t i : {8U, 5U, 2U}) good.erase(good.begin() + i);
+    const auto without = resect(setup.camera, good, setup.field, ResectConfig{});
+    REQUIRE(without);
+    CHECK((result->pose.center_world_mm - without->pose.center_world_mm).norm() < 1e-3);  // the same pose
+    REQUIRE(result->targets.size() == 10);
+    for (std::size_t i = 0; i < 10; ++i) CHECK(result->targets[i].used == (i != 2 && i != 5 && i != 8));
+  }
+}
+
+TEST_CASE("resect: dirt that moves a quarter of the centres by half a pixel is left out") {
+  int left_out = 0;
+  double worst_mm = 0.0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Setup setup(16, seed);
+    auto detected = setup.detect(0.02, seed);
+    for (const std::size_t i : {1U, 6U, 10U, 15U}) {
+      detected[i].center.x_px += 0.4;
+      detected[i].center.y_px -= 0.3;
+    }
+    const auto result = resect(setup.camera, detected, setup.field, ResectConfig{});
+    REQUIRE(result);
+    for (const std::size_t i : {1U, 6U, 10U, 15U}) left_out += result->targets[i].used ? 0 : 1;
+    worst_mm = std::max(worst_mm, (result->pose.center_world_mm - setup.pose.center_world_mm).norm());
+  }
+  CHECK(left_out >= 38);  // of 40
+  CHECK(worst_mm < 1.5);  // 12 clean targets of 0.02 px, some fields poor
+}
+
 TEST_CASE("resect: one target displaced by a third of a pixel is left out") {
   const Setup setup(20);
   auto detected = setup.detect(0.02, 3);
