@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""./dev bench [stages|accuracy|targets]: what the node costs and how near the truth the measurement comes.
+"""./dev bench [stages|accuracy|targets|calibration]: what the node costs and how near the truth the measurement comes.
 
 stages    renders one frame of the forge scene; prints the time of every stage beside cv::Canny, and of the renderer.
 accuracy  renders and measures several seeds of both scenes; prints the errors against the truth.
 targets   the paper's target benchmark, recall and precision beside OpenCV's ArUco; only when asked for.
+calibration  tables 3 to 5 and figure 9 of paper B on rendered frames, and 200 repetitions; only when asked for.
 """
 import argparse
 import json
@@ -70,12 +71,12 @@ def print_row(scene, observations, seed, values):
 
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets"], help="default: both")
+    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets", "calibration"], help="default: both")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)
     options = parser.parse_args()
-    if options.name == "targets":
-        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "targets" / "targets_bench"], check=False).returncode)
+    if options.name in ("targets", "calibration"):
+        sys.exit(subprocess.run([BUILD / "tests" / "paper" / options.name / f"{options.name}_bench"], check=False).returncode)
     for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")
