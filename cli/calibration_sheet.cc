@@ -46,6 +46,7 @@ class Pen {
     cairo_stroke(raw());
   }
   void dot(double x, double y, double radius) {
+    cairo_new_path(raw());  // text leaves its end behind, from where an arc would draw a line
     cairo_arc(raw(), x, y, radius, 0, 2 * std::numbers::pi);
     cairo_fill(raw());
   }

@@ -27,10 +27,12 @@ bool convincing(const Resection& resection) {
   return used >= 6 && used >= 0.7 * static_cast<double>(resection.targets.size());
 }
 
-bool fits_mirrored(const CameraModel& camera, const std::vector<DetectedTarget>& targets, TargetField field) {
+// How many targets fit the mirror image of the field; 0 where it is not convincing. A field that is flat but for a few
+// targets fits both ways with most of them: the few decide.
+int fitting_mirrored(const CameraModel& camera, const std::vector<DetectedTarget>& targets, TargetField field) {
   for (auto& [id, target] : field.targets) target.p_world_mm.x() *= -1.0;
   const auto resection = rough_pose(camera, targets, field);
-  return resection && convincing(*resection);
+  return resection && convincing(*resection) ? used_targets(*resection) : 0;
 }
 
 // The focal length that the targets fit best, from a thirtieth to thirty times the one stated.
@@ -57,11 +59,13 @@ std::optional<double> fitting_focal_length(CameraModel camera, const std::vector
 Result<CameraPose> calibration_start(const CameraModel& nominal, const std::vector<DetectedTarget>& targets,
                                      const TargetField& field) {
   const auto resection = rough_pose(nominal, targets, field);
-  if (resection && convincing(*resection)) return resection->pose;
-  if (fits_mirrored(nominal, targets, field))
+  constexpr int kMoreThanChance = 2;
+  const int fitting = resection ? used_targets(*resection) : 0;
+  if (fitting_mirrored(nominal, targets, field) >= fitting + kMoreThanChance)
     return invalid_input(
         "the targets contradict the field, but fit its mirror image: check the signs and the order of the field's axes "
         "(they must be right-handed)");
+  if (resection && convincing(*resection)) return resection->pose;
   if (const auto focal = fitting_focal_length(nominal, targets, field);
       focal && std::abs(std::log(*focal / nominal.focal_length_px)) > 0.1)
     return invalid_input(

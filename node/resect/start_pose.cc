@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <random>
 
 #include <opencv2/calib3d.hpp>
@@ -10,6 +11,17 @@ namespace imprint {
 namespace {
 
 constexpr int kTriples = 400;  // 30 % wrong ids leave 0.34 of the triples good: missing all is below 1e-70
+
+constexpr int kFewestTriples = 60;  // a good start wants a well spread triple, not only one of right ids
+
+// Triples after which a right one has been among them but for one case in 1e12, `share` of the ids being right.
+int triples_needed(double share) {
+  const double right = share * share * share;
+  if (right >= 1.0) return kFewestTriples;
+  if (right <= 0.0) return kTriples;
+  const double triples = std::ceil(std::log(1e-12) / std::log1p(-right));
+  return static_cast<int>(std::clamp<double>(triples, kFewestTriples, kTriples));
+}
 
 struct Consensus {
   int agreeing = 0;
@@ -64,7 +76,8 @@ std::optional<CameraPose> start_pose(const std::vector<Correspondence>& all, dou
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::optional<CameraPose> best;
   Consensus best_consensus;
-  for (int i = 0; i < kTriples; ++i) {
+  int needed = kTriples;
+  for (int i = 0; i < needed; ++i) {
     for (std::size_t k = 0; k < 3; ++k) std::swap(order[k], order[k + random() % (order.size() - k)]);
     for (const CameraPose& pose : poses_from_three({&all[order[0]], &all[order[1]], &all[order[2]]})) {
       const Consensus consensus = count_agreeing(all, pose, tolerance);
@@ -72,6 +85,7 @@ std::optional<CameraPose> start_pose(const std::vector<Correspondence>& all, dou
           (consensus.agreeing == best_consensus.agreeing && consensus.cost < best_consensus.cost)) {
         best = pose;
         best_consensus = consensus;
+        needed = triples_needed(consensus.agreeing / static_cast<double>(all.size()));
       }
     }
   }

@@ -60,6 +60,26 @@ TEST_CASE("calibrate: a mirrored field is refused, and said to be one") {
   CHECK_THAT(start.error().message, Contains("mirror image"));
 }
 
+TEST_CASE("calibrate: a mirrored field that is flat but for five targets is refused too; the right one is not") {
+  View view;
+  int raised = 0;
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  for (auto& [id, target] : view.field.targets) target.p_world_mm.z() = id % 7 == 0 && ++raised <= 5 ? 800.0 : 0.0;
+  view.pose.R_cam_world = rotation_from_vector({0.4, -0.3, 0.3});
+  view.pose.center_world_mm = -view.pose.R_cam_world.transpose() * Eigen::Vector3d(100.0, 150.0, 8000.0);
+  view.targets.clear();
+  for (const auto& [id, target] : view.field.targets) {
+    const ObservedPoint at = project(view.camera, view.pose.cam_from_world(target.p_world_mm));
+    view.targets.push_back({id, {at.x_px + noise(random), at.y_px + noise(random)}, 0.02, 20.0, 0.0});
+  }
+  CHECK(calibration_start(view.camera, view.targets, view.field));
+  for (auto& [id, target] : view.field.targets) target.p_world_mm.x() *= -1.0;
+  const auto start = calibration_start(view.camera, view.targets, view.field);
+  REQUIRE(!start);
+  CHECK_THAT(start.error().message, Contains("mirror image"));
+}
+
 TEST_CASE("calibrate: a pixel pitch wrong by ten either way is refused, with the focal length that would fit") {
   for (const double factor : {10.0, 0.1}) {
     View view;

@@ -125,7 +125,8 @@ TEST_CASE("node pipeline: empty frames give the pose that is held when the forgi
   PoseKeeper keeper;
   int second = 0;
   while (second < 4) {
-    const Imprint empty = line().process(line().empty_hall(++second), &keeper, second);
+    ++second;
+    const Imprint empty = line().process(line().empty_hall(second), &keeper, second);
     CHECK_THAT(empty.failure, Contains("cam1"));  // there is no forging to measure
     CHECK(empty.quality.targets_used >= 8);
   }

@@ -109,11 +109,11 @@ TEST_CASE("pose keeper: the pose held through hot frames is nearer the truth tha
   CHECK(held < 0.4 * own_error);  // 2.5 times the noise, and an average of about ten cold frames
 }
 
-TEST_CASE("pose keeper: nothing moves in 400 frames and nothing is raised") {
+TEST_CASE("pose keeper: nothing moves in 240 frames and nothing is raised") {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Line line(seed);
     PoseKeeper keeper;
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < 60; ++i) {
       const bool hot = i % 20 >= 10;
       const auto kept = keeper.update(line.see(hot ? kHotNoise_px : 0.05), hot, i * kSecond);
       REQUIRE(kept);
