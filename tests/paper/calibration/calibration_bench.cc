@@ -20,7 +20,7 @@ struct Options {
   int hot_frames = 4;
   int jobs = 2;
   unsigned seed = 1;
-  double noise_px = 0.02;
+  double noise_px = 0.01;  // an axis: what the detector reaches on the rendered frames is 0.006 to 0.007
 };
 
 int failed(const Error& error) {
@@ -155,8 +155,13 @@ void report_repetitions(const Options& options) {
              exact.e2d_rms_mm, exact.e2d_max_mm, exact.e3d_rms_mm);
   const double sigma_mm = kLargeScale.field_rms_mm / std::sqrt(3.0);
   const CheckErrors surveyed = repeat_check(checks, options.noise_px, sigma_mm);
-  fmt::print("  check targets, field off by {:.3f} mm RMS (table 2): 2D RMS {:.4f} mm, max {:.4f} (goal: {:.3f})\n",
-             kLargeScale.field_rms_mm, surveyed.e2d_rms_mm, surveyed.e2d_max_mm, kLargeScale.field_rms_mm);
+  // Of a check target's own coordinates, in the measure of table 5: two directions, times the root of two.
+  const double own_mm = 2.0 * sigma_mm;
+  fmt::print(
+      "  check targets, field off by {:.3f} mm RMS (table 2): 2D RMS {:.4f} mm, max {:.4f}; the check targets' own "
+      "error "
+      "alone makes {:.3f} (paper 0.254)\n",
+      kLargeScale.field_rms_mm, surveyed.e2d_rms_mm, surveyed.e2d_max_mm, own_mm);
 }
 
 }  // namespace
