@@ -41,6 +41,7 @@ inline int print_json(const nlohmann::json& document) {
 void add_targets_command(Cli& cli);
 void add_resect_command(Cli& cli);
 void add_calibrate_command(Cli& cli);
+void add_survey_command(Cli& cli);
 void add_edges_command(Cli& cli);
 void add_measure_command(Cli& cli);
 void add_report_command(Cli& cli);

@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   imprint::add_targets_command(cli);
   imprint::add_resect_command(cli);
   imprint::add_calibrate_command(cli);
+  imprint::add_survey_command(cli);
   imprint::add_edges_command(cli);
   imprint::add_measure_command(cli);
   imprint::add_report_command(cli);
