@@ -42,6 +42,8 @@ void add_targets_command(Cli& cli);
 void add_resect_command(Cli& cli);
 void add_calibrate_command(Cli& cli);
 void add_survey_command(Cli& cli);
+void add_field_command(Cli& cli);
+void add_verify_command(Cli& cli);
 void add_edges_command(Cli& cli);
 void add_measure_command(Cli& cli);
 void add_report_command(Cli& cli);

@@ -8,6 +8,8 @@ int main(int argc, char** argv) {
   imprint::add_resect_command(cli);
   imprint::add_calibrate_command(cli);
   imprint::add_survey_command(cli);
+  imprint::add_field_command(cli);
+  imprint::add_verify_command(cli);
   imprint::add_edges_command(cli);
   imprint::add_measure_command(cli);
   imprint::add_report_command(cli);

@@ -138,4 +138,11 @@ Result<cv::Mat> render_frame_on(const cv::Mat& backdrop, const Scene& scene, con
       image);
 }
 
+cv::Mat render_targets_on(const cv::Mat& backdrop, const Scene& scene, const Layout& layout, int camera) {
+  cv::Mat image = backdrop.clone();
+  paint_plates(scene, layout, camera, Haze(scene, layout, 0, camera), image);
+  blur(scene.imaging.blur_sigma_px, image);
+  return expose(scene.imaging, stream_seed(scene.seed, "sensor", 0, static_cast<std::uint64_t>(camera)), image);
+}
+
 }  // namespace imprint

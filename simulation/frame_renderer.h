@@ -13,4 +13,7 @@ namespace imprint {
 Result<cv::Mat> render_frame_on(const cv::Mat& backdrop, const Scene& scene, const Layout& layout, int observation,
                                 int camera);
 
+/// The same without forging and hot air: plates before the backdrop, painted in the layout's order.
+cv::Mat render_targets_on(const cv::Mat& backdrop, const Scene& scene, const Layout& layout, int camera);
+
 }  // namespace imprint

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include <ceres/ceres.h>
 #include <Eigen/Geometry>
@@ -12,7 +14,7 @@ namespace {
 
 constexpr int kFewestSights = 4;
 constexpr double kDiameterShare = 0.005, kDiameterFloor_px = 0.05;  // what a mean diameter is off (ours)
-constexpr double kTiltSigma = 0.6;     // tangent of the angle between a plate and the mean line of sight (ours)
+constexpr double kTurnSigma = 1.0;     // tangent by which a normal may differ from its start (ours)
 constexpr double kRadiusSigma = 0.02;  // share by which dots of one print run differ (ours)
 
 // Mean diameter of the image of a disc: its axes are the singular values of the projection within its plane.
@@ -41,8 +43,8 @@ struct DiscExpectation {
   template <class T>
   bool operator()(const T* disc, T* residual) const {
     residual[0] = (disc[0] - log_radius) / radius_sigma;
-    residual[1] = disc[1] / kTiltSigma;
-    residual[2] = disc[2] / kTiltSigma;
+    residual[1] = disc[1] / kTurnSigma;
+    residual[2] = disc[2] / kTurnSigma;
     return true;
   }
 };
@@ -62,32 +64,84 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+// What one sight tells of its target's disc.
+struct SizeSeen {
+  Eigen::Matrix<double, 2, 3> projection;
+  Eigen::Vector3d back;  // direction from the target to the camera
+  double diameter_px = 0.0, sigma_px = 0.0;
+};
+
+// Mean diameter of the image of a disc of radius 1.
+double unit_diameter(const Eigen::Matrix<double, 2, 3>& projection, const Eigen::Vector3d& normal) {
+  const Eigen::Matrix2d a =
+      projection * (Eigen::Matrix3d::Identity() - normal * normal.transpose()) * projection.transpose();
+  return std::sqrt(a.trace() + 2.0 * std::sqrt(std::max(0.0, a.determinant())));
+}
+
+// The best of normals spread over all that every camera sees from the front; the tilt's sizes have several minima.
+std::optional<Eigen::Vector3d> start_normal(const std::vector<SizeSeen>& seen, double radius, double radius_sigma) {
+  constexpr int kRings = 8, kAround = 24;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const SizeSeen& size : seen) middle += size.back;
+  const Eigen::Vector3d axis = middle.normalized(), side = axis.unitOrthogonal(), up = axis.cross(side);
+  std::optional<Eigen::Vector3d> best;
+  double least = 1e300;
+  for (int i = 0; i < kRings * kAround; ++i) {
+    const double tilt = 0.5 * std::numbers::pi * (i / kAround) / kRings,
+                 around = 2.0 * std::numbers::pi * (i % kAround) / kAround;
+    const Eigen::Vector3d n =
+        std::cos(tilt) * axis + std::sin(tilt) * (std::cos(around) * side + std::sin(around) * up);
+    if (std::any_of(seen.begin(), seen.end(), [&](const SizeSeen& size) { return size.back.dot(n) < 0.05; })) continue;
+    double sum_aa = 1.0 / (radius * radius * radius_sigma * radius_sigma);
+    double sum_ab = sum_aa * radius;
+    std::vector<double> units;
+    for (const SizeSeen& size : seen) {
+      units.push_back(unit_diameter(size.projection, n) / size.sigma_px);
+      sum_aa += units.back() * units.back();
+      sum_ab += units.back() * size.diameter_px / size.sigma_px;
+    }
+    const double fitted = sum_ab / sum_aa;
+    const double off_radius = (fitted / radius - 1.0) / radius_sigma;
+    double cost = std::log1p(off_radius * off_radius);
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      const double off = units[k] * fitted - seen[k].diameter_px / seen[k].sigma_px;
+      cost += std::log1p(0.25 * off * off);
+    }
+    if (cost < least) {
+      least = cost;
+      best = n;
+    }
+  }
+  return best;
+}
+
 std::optional<DotDisc> find_disc(const Network& network, const std::vector<const Sight*>& sights,
                                  const Eigen::Vector3d& p, double log_radius, double radius_sigma) {
-  Eigen::Vector3d towards = Eigen::Vector3d::Zero();
-  for (const Sight* sight : sights) towards += (network.poses[sight->photo]->center_world_mm - p).normalized();
-  if (towards.norm() < 0.1 * static_cast<double>(sights.size())) return std::nullopt;
-  towards.normalize();
-  const Eigen::Vector3d side = towards.unitOrthogonal(), up = towards.cross(side);
+  std::vector<SizeSeen> seen;
+  for (const Sight* sight : sights) {
+    const CameraPose& pose = *network.poses[sight->photo];
+    seen.push_back({projection_slope(network.camera, pose, p), (pose.center_world_mm - p).normalized(),
+                    sight->dot_diameter_px, kDiameterFloor_px + kDiameterShare * sight->dot_diameter_px});
+  }
+  const auto start = start_normal(seen, std::exp(log_radius), radius_sigma);
+  if (!start) return std::nullopt;
+  const Eigen::Vector3d side = start->unitOrthogonal(), up = start->cross(side);
   std::array<double, 3> disc{log_radius, 0.0, 0.0};
   ceres::Problem problem;
   problem.AddResidualBlock(
       new ceres::AutoDiffCostFunction<DiscExpectation, 3, 3>(new DiscExpectation{log_radius, radius_sigma}), nullptr,
       disc.data());
-  for (const Sight* sight : sights) {
-    const double sigma = kDiameterFloor_px + kDiameterShare * sight->dot_diameter_px;
+  for (const SizeSeen& size : seen)
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<DiameterError, 1, 3>(
-                                 new DiameterError{projection_slope(network.camera, *network.poses[sight->photo], p),
-                                                   towards, side, up, sight->dot_diameter_px, sigma}),
+                                 new DiameterError{size.projection, *start, side, up, size.diameter_px, size.sigma_px}),
                              new ceres::CauchyLoss(2.0), disc.data());
-  }
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_QR;
   how.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem, &summary);
   if (!summary.IsSolutionUsable()) return std::nullopt;
-  return DotDisc{std::exp(disc[0]), (towards + disc[1] * side + disc[2] * up).normalized(),
+  return DotDisc{std::exp(disc[0]), (*start + disc[1] * side + disc[2] * up).normalized(),
                  static_cast<int>(sights.size())};
 }
 
@@ -128,13 +182,28 @@ std::map<int, DotDisc> find_dot_discs(const Network& network, const std::vector<
 
 ObservedPoint eccentricity_px(const CameraModel& camera, const CameraPose& pose, const Eigen::Vector3d& p_world,
                               const DotDisc& disc) {
-  // The image's dual conic is r^2 (I - n n') - X X' in camera axes; its centre is the third column.
-  const Eigen::Vector3d p = pose.cam_from_world(p_world), n = pose.R_cam_world * disc.normal;
-  const Eigen::Matrix3d plane = Eigen::Matrix3d::Identity() - n * n.transpose();
-  const Eigen::Vector3d column = disc.radius * disc.radius * plane.col(2) - p * p.z();
-  const Eigen::Vector2d shift = camera.focal_length_px * (column.head<2>() / column.z() - p.head<2>() / p.z());
-  const Eigen::Vector2d seen = distortion_jacobian(camera, project_ideal(camera, p)) * shift;
-  return {seen.x(), seen.y()};
+  constexpr int kCorners = 64;  // of a polygon on the outline; its centroid is the ellipse's, affinely
+  const Eigen::Vector3d side = disc.normal.unitOrthogonal(), up = disc.normal.cross(side);
+  const auto seen = [&](const Eigen::Vector3d& p) {
+    const ObservedPoint at = project(camera, pose.cam_from_world(p));
+    return Eigen::Vector2d(at.x_px, at.y_px);
+  };
+  const Eigen::Vector2d centre = seen(p_world);
+  const auto corner = [&](int i) {
+    const double a = 2.0 * std::numbers::pi * i / kCorners;
+    return Eigen::Vector2d(seen(p_world + disc.radius * (std::cos(a) * side + std::sin(a) * up)) - centre);
+  };
+  double area = 0.0;
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero(), from = corner(0);
+  for (int i = 1; i <= kCorners; ++i) {
+    const Eigen::Vector2d to = corner(i % kCorners);
+    const double cross = from.x() * to.y() - from.y() * to.x();
+    area += 0.5 * cross;
+    moment += cross * (from + to) / 6.0;
+    from = to;
+  }
+  if (!(std::abs(area) > 1e-9)) return {};
+  return {moment.x() / area, moment.y() / area};
 }
 
 void correct_eccentricity(const Network& network, std::vector<Sight>& sights) {

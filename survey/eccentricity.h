@@ -20,7 +20,7 @@ struct DotDisc {
 std::map<int, DotDisc> find_dot_discs(const Network& network, const std::vector<Sight>& sights);
 
 /// How far the centre of the disc's image lies from the image of its centre, in observed px: perspective makes the
-/// nearer half larger. Exact but for the bending of the lens across the dot.
+/// nearer half larger, and the lens bends across the dot. The disc must lie before the camera.
 ObservedPoint eccentricity_px(const CameraModel& camera, const CameraPose& pose, const Eigen::Vector3d& p_world,
                               const DotDisc& disc);
 

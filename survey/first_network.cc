@@ -257,9 +257,10 @@ std::vector<Sight> sights_of(const std::vector<SurveyPhoto>& photos, double nois
 Result<Network> first_network(const CameraModel& camera, bool focal_known, std::size_t photos,
                               const std::vector<Sight>& sights, const FirstNetworkConfig& config) {
   Network best;
-  int most = 0, convincing = 0;
+  int most = 0, convincing = 0, idle = 0;  // idle: attempts in a row that brought nothing
   CameraModel known = camera;
   for (int attempt = 0; attempt < config.pairs_to_try; ++attempt) {
+    const int before = most;
     for (const double factor : focal_factors(focal_known)) {
       CameraModel trial = known;
       trial.focal_length_px *= factor;
@@ -287,6 +288,8 @@ Result<Network> first_network(const CameraModel& camera, bool focal_known, std::
         break;
       }
     }
+    idle = most > before + static_cast<int>(sights.size()) / 50 ? 0 : idle + 1;
+    if (idle == 2 && 2 * best.posed() >= static_cast<int>(photos)) return best;
   }
   if (best.posed() < 2 || best.points.size() < 5)
     return job_failed(

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the layers: lib <- node, lib <- fusion; node and fusion never meet; protobuf only in lib/wire, Zenoh only in
+"""Checks the layers: lib <- node, lib <- fusion; node and fusion never meet; lib, node <- survey; protobuf only in lib/wire, Zenoh only in
 lib/transport; the renderer and the estimators know nothing of each other."""
 import pathlib
 import re
@@ -8,10 +8,11 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # folder -> folders it must not include
 FORBIDDEN = {
-    "lib": ["node", "fusion", "cli", "simulation"],
-    "node": ["fusion", "cli"],
-    "fusion": ["node", "cli", "simulation"],
-    "simulation": ["node", "fusion", "cli"],
+    "lib": ["node", "fusion", "survey", "cli", "simulation"],
+    "node": ["fusion", "survey", "cli"],
+    "fusion": ["node", "survey", "cli", "simulation"],
+    "survey": ["fusion", "cli", "simulation"],
+    "simulation": ["node", "fusion", "survey", "cli"],
 }
 # text in an include -> the only folder that may have it
 ONLY_IN = {"google/protobuf": "lib/wire", ".pb.h": "lib/wire", "zenoh_bridge": "lib/transport"}

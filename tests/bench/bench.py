@@ -77,6 +77,11 @@ def main():
     options = parser.parse_args()
     if options.name in ("targets", "calibration"):
         sys.exit(subprocess.run([BUILD / "tests" / "paper" / options.name / f"{options.name}_bench"], check=False).returncode)
+    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets", "survey"], help="default: both")
+    if options.name == "survey":
+        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "survey" / "survey_bench"], check=False).returncode)
+    if options.name == "targets":
+        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "targets" / "targets_bench"], check=False).returncode)
     for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")

@@ -119,8 +119,9 @@ TEST_CASE("survey: large dots seen aslant are not measured beside their centres"
   const auto as_seen = survey_field(input, config);
   REQUIRE(corrected.has_value());
   REQUIRE(as_seen.has_value());
-  WARN(rms_after_fit(field, *corrected) << " " << rms_after_fit(field, *as_seen) << " "
-                                        << corrected->reprojection_rms_px << " " << as_seen->reprojection_rms_px);
+  // 0.002 px would leave 0.01 to 0.02 mm; what is more comes of the tilts, found to about a degree.
+  CHECK(rms_after_fit(field, *corrected) < 0.5 * rms_after_fit(field, *as_seen));
+  CHECK(corrected->reprojection_rms_px < 0.4 * as_seen->reprojection_rms_px);
 }
 
 TEST_CASE("survey: targets with few or narrow rays are reported, those seen once are not made up") {
