@@ -2,9 +2,9 @@
 
 #include <random>
 
-#include <Eigen/LU>
 #include <catch2/catch.hpp>
 
+#include "lib/camera/camera_pose.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
@@ -14,7 +14,6 @@ namespace {
 struct Rig {
   TargetField field;
   std::vector<VerifyView> views;
-  std::vector<CameraPose> poses;
   ScaleBar bar{901, 902, 0.0, 0.005};
   TargetField all;  // the bar's ends too
 };
@@ -54,7 +53,6 @@ Rig make_rig(unsigned seed, double noise_px) {
       seen.sigma_px = noise_px;
       view.targets.push_back(seen);
     }
-    rig.poses.push_back(pose);
     rig.views.push_back(std::move(view));
   }
   return rig;
@@ -74,10 +72,10 @@ TEST_CASE("verify: exact centres give back the bar and the targets") {
   CHECK(report->checks[0].cameras == std::vector<std::string>{"cam1", "cam2"});
 }
 
-TEST_CASE("verify: the 95 % interval of a bar holds its deviation in 88 to 100 % of the repetitions") {
+TEST_CASE("verify: the 95 % interval of a bar holds its deviation in 85 to 100 % of the repetitions") {
   int inside = 0;
   double squares = 0.0, widths = 0.0;
-  constexpr int kRepetitions = 100;
+  constexpr int kRepetitions = 40;
   for (unsigned seed = 1; seed <= kRepetitions; ++seed) {
     Rig rig = make_rig(seed, 0.1);
     std::mt19937 random(seed + 1000);
@@ -89,7 +87,7 @@ TEST_CASE("verify: the 95 % interval of a bar holds its deviation in 88 to 100 %
     squares += check.deviation_mm * check.deviation_mm;
     widths += check.ci95_mm;
   }
-  CHECK(inside >= 88);  // 95 less three standard deviations of a count of 100
+  CHECK(inside >= 34);  // 95 % less three standard deviations of a count of 40
   // Not by being wide: the noise floor of 0.05 px beside 0.1 px makes them 12 % wider than need be.
   CHECK(widths / kRepetitions < 1.5 * 1.96 * std::sqrt(squares / kRepetitions));
 }
