@@ -73,17 +73,14 @@ def print_row(scene, observations, seed, values):
 
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets", "calibration"], help="default: both")
+    papers = {"targets": "targets", "clutter": "targets", "calibration": "calibration", "survey": "survey"}
+    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", *papers], help="default: stages and accuracy")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)
     options = parser.parse_args()
-    if options.name in ("targets", "calibration"):
-        sys.exit(subprocess.run([BUILD / "tests" / "paper" / options.name / f"{options.name}_bench"], check=False).returncode)
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets", "survey"], help="default: both")
-    if options.name == "survey":
-        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "survey" / "survey_bench"], check=False).returncode)
-    if options.name == "targets":
-        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "targets" / "targets_bench"], check=False).returncode)
+    if options.name in papers:
+        bench = BUILD / "tests" / "paper" / papers[options.name] / f"{options.name}_bench"
+        sys.exit(subprocess.run([bench], check=False).returncode)
     for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")
