@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "cli/command.h"
+#include "cli/targets_sheet.h"
 #include "lib/config/atomic_file.h"
 #include "lib/targets/library_generator.h"
 #include "lib/targets/lookup_table.h"
@@ -201,11 +202,12 @@ void add_detect(Cli& cli, CLI::App& targets) {
 }  // namespace
 
 void add_targets_command(Cli& cli) {
-  CLI::App* targets = cli.app.add_subcommand("targets", "coded targets: libraries and detection");
+  CLI::App* targets = cli.app.add_subcommand("targets", "coded targets: libraries, sheets to print and detection");
   targets->require_subcommand(1);
   add_generate(cli, *targets);
   add_import(cli, *targets);
   add_detect(cli, *targets);
+  add_targets_sheet(cli, *targets);
 }
 
 }  // namespace imprint
