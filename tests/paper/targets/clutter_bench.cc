@@ -39,7 +39,7 @@ struct Tally {
 Tally look_through(const TargetLibrary& library, Clutter kind, std::string_view name, const Options& options,
                    const PhotographPieces& pieces) {
   Tally tally;
-  constexpr int kinds = static_cast<int>(all_clutter.size());
+  constexpr int kinds = static_cast<int>(counted_clutter.size());
   for (int i = options.first; i < options.first + options.frames; ++i) {
     if (options.only.empty() && i % kinds != static_cast<int>(kind)) continue;
     const cv::Mat frame =
@@ -65,7 +65,9 @@ int count_claims(const TargetLibrary& library, const Options& options, const Pho
   fmt::print("library of {} codes of {} bits at distance {}, frames of {:.1f} megapixels\n", library.codes.size(),
              library.bits, library.min_distance, options.width_px * options.height_px / 1e6);
   Tally all;
-  for (const auto& [kind, name] : all_clutter) {
+  std::vector<NamedClutter> kinds(counted_clutter.begin(), counted_clutter.end());
+  if (options.only == look_alikes.name) kinds = {look_alikes};
+  for (const auto& [kind, name] : kinds) {
     if (!options.only.empty() && options.only != name) continue;
     if (kind == Clutter::photographs && pieces.pieces.empty()) {
       fmt::print("{:<10} left out: no photographs in {}\n", name, options.photographs);
@@ -86,6 +88,12 @@ int count_claims(const TargetLibrary& library, const Options& options, const Pho
   return all.claims;
 }
 
+std::vector<std::string> known_kinds() {
+  std::vector<std::string> names{std::string(look_alikes.name)};
+  for (const NamedClutter& clutter : counted_clutter) names.emplace_back(clutter.name);
+  return names;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -96,8 +104,10 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--width", options.width_px, "px")->check(CLI::Range(64, 20000));
   app.add_option("--height", options.height_px, "px")->check(CLI::Range(64, 20000));
-  app.add_option("--only", options.only, "one kind of clutter");
-  app.add_option("--library", options.library, "own: 60 codes at distance 4; greedy: 60 at 3; default: both");
+  app.add_option("--only", options.only, "one kind; lookalikes are not among the others")
+      ->check(CLI::IsMember(known_kinds()));
+  app.add_option("--library", options.library, "own: 60 codes at distance 4; greedy: 60 at 3; default: both")
+      ->check(CLI::IsMember({"own", "greedy"}));
   app.add_option("--save", options.save, "folder for the frames in which something is claimed")
       ->check(CLI::ExistingDirectory);
   app.add_option("--photographs", options.photographs, "folder with photographs and visible.csv");

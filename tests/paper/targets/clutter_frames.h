@@ -10,19 +10,21 @@
 
 namespace imprint::paper {
 
-/// Kinds of frames without coded targets: what a camera in a hall, a laboratory or an office sees.
-enum class Clutter { shapes, print, circuit, machines, gauges, hall, texture, grids, photographs };
+/// Kinds of frames without coded targets: what a camera in a hall, a laboratory or an office sees. Look-alikes, targets
+/// of no library, stand apart: some of them are nearer to a code than a soiled target is.
+enum class Clutter { shapes, print, circuit, machines, gauges, hall, texture, grids, photographs, look_alikes };
 
 struct NamedClutter {
   Clutter kind;
   std::string_view name;
 };
-inline constexpr std::array all_clutter{
+inline constexpr std::array counted_clutter{
     NamedClutter{Clutter::shapes, "shapes"},     NamedClutter{Clutter::print, "print"},
     NamedClutter{Clutter::circuit, "circuit"},   NamedClutter{Clutter::machines, "machines"},
     NamedClutter{Clutter::gauges, "gauges"},     NamedClutter{Clutter::hall, "hall"},
     NamedClutter{Clutter::texture, "texture"},   NamedClutter{Clutter::grids, "grids"},
     NamedClutter{Clutter::photographs, "photos"}};
+inline constexpr NamedClutter look_alikes{Clutter::look_alikes, "lookalikes"};
 
 /// Photographs without the squares round their coded targets, to be cut into pieces.
 struct PhotographPieces {

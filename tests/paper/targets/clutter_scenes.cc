@@ -274,7 +274,9 @@ cv::Mat draw_clutter_frame(Clutter kind, int width, int height, std::uint64_t se
   cv::RNG random(seed * 7919 + static_cast<std::uint64_t>(kind) + 1);
   switch (kind) {
     case Clutter::shapes:
-      return exposed(draw_clutter(width, height, seed), random);
+      return exposed(draw_clutter(width, height, seed, LookAlikes::without), random);
+    case Clutter::look_alikes:
+      return exposed(draw_clutter(width, height, seed, LookAlikes::with), random);
     case Clutter::print:
       return exposed(draw_print(width, height, random), random);
     case Clutter::circuit:

@@ -165,7 +165,7 @@ Sheet with_patches(const Sheet& sheet, const Patch& patch, int bits) {
   return covered;
 }
 
-cv::Mat draw_clutter(int width, int height, std::uint64_t seed) {
+cv::Mat draw_clutter(int width, int height, std::uint64_t seed, LookAlikes look_alikes) {
   cv::RNG random(seed);
   cv::Mat scene = octaves(width, height, random) * 0.13 + 0.5;
   const double area = static_cast<double>(width) * height;
@@ -177,7 +177,7 @@ cv::Mat draw_clutter(int width, int height, std::uint64_t seed) {
     const cv::Size2d axes(size, size * random.uniform(0.3, 1.0));
     const double turn = random.uniform(0.0, 180.0);
     const int line = random.uniform(0, 3) == 0 ? -1 : 1 + static_cast<int>(size / random.uniform(3.0, 12.0));
-    switch (random.uniform(0, 6)) {
+    switch (random.uniform(0, look_alikes == LookAlikes::with ? 6 : 5)) {
       case 0:
         cv::ellipse(scene, cv::RotatedRect(place, axes * 2.0, static_cast<float>(turn)), grey, line);
         break;

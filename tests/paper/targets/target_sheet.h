@@ -39,7 +39,10 @@ Sheet draw_aruco(const cv::aruco::Dictionary& dictionary, Background background)
 /// The same patches over either kind of sheet, between 1.5 and 3.5 dot radii round each centre.
 Sheet with_patches(const Sheet& sheet, const Patch& patch, int bits);
 
-/// A scene without targets: folds of light, texture at all scales, boards, bars, discs, rings, letters.
-cv::Mat draw_clutter(int width, int height, std::uint64_t seed);
+enum class LookAlikes { with, without };
+
+/// A scene without targets: folds of light, texture at all scales, boards, bars, discs, rings, letters. Look-alikes are
+/// dots in rings that are broken anywhere, in the proportions of a target: targets of no library, in all but name.
+cv::Mat draw_clutter(int width, int height, std::uint64_t seed, LookAlikes look_alikes = LookAlikes::with);
 
 }  // namespace imprint::paper
