@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "cli/command.h"
+#include "cli/detection_picture.h"
 #include "cli/targets_sheet.h"
 #include "lib/config/atomic_file.h"
 #include "lib/targets/library_generator.h"
@@ -130,7 +131,7 @@ void print_table(const ImageDetections& detections) {
 
 Result<void> write_png(const cv::Mat& image, const fs::path& path) {
   std::vector<unsigned char> bytes;
-  cv::imencode(".png", image, bytes);
+  if (!cv::imencode(".png", image, bytes)) return job_failed("{}: the picture could not be made", path.string());
   return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -139,7 +140,33 @@ struct DetectOptions {
   DetectConfig config;
   std::vector<fs::path> images;
   fs::path debug_image;
+
+  [[nodiscard]] fs::path debug_image_of(const fs::path& image) const {
+    return fs::is_directory(debug_image) ? debug_image / image.stem().concat(".png") : debug_image;
+  }
 };
+
+/// One picture an image, none written over another or over an image.
+Result<void> check_debug_images(const DetectOptions& options) {
+  if (options.debug_image.empty()) return {};
+  if (options.images.size() > 1 && !fs::is_directory(options.debug_image)) {
+    return invalid_input("--debug-image: expected a folder that exists, for {} images, found {}", options.images.size(),
+                         options.debug_image.string());
+  }
+  std::map<fs::path, fs::path> image_of;
+  for (const fs::path& image : options.images) {
+    const fs::path picture = options.debug_image_of(image);
+    const auto [other, added] = image_of.emplace(picture, image);
+    if (!added && other->second != image) {
+      return invalid_input("--debug-image: expected images of different names, found {} and {}, both for {}",
+                           other->second.string(), image.string(), picture.string());
+    }
+    std::error_code unknown;
+    if (fs::equivalent(picture, image, unknown))
+      return invalid_input("--debug-image: expected another file than the image {}", image.string());
+  }
+  return {};
+}
 
 Result<ImageDetections> detect_in_file(const fs::path& path, const TargetLibrary& library,
                                        const DetectOptions& options) {
@@ -154,18 +181,16 @@ Result<ImageDetections> detect_in_file(const fs::path& path, const TargetLibrary
       detect_targets(frame->image, library, options.config, options.debug_image.empty() ? nullptr : &trace);
   detections.elapsed_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   if (!options.debug_image.empty()) {
-    const cv::Mat drawing = draw_detections(frame->image, detections.targets, trace);
-    if (const auto written = write_png(drawing, options.debug_image); !written) return pass_on(written.error());
+    const cv::Mat picture = draw_detection_picture(frame->image, detections.targets, trace);
+    if (const auto written = write_png(picture, options.debug_image_of(path)); !written)
+      return pass_on(written.error());
   }
   return detections;
 }
 
 int run_detect(const Cli& cli, const DetectOptions& options) {
   if (const auto valid = options.config.validate(); !valid) return fail(valid.error());
-  if (!options.debug_image.empty() && options.images.size() != 1) {
-    return fail(Error{ErrorKind::invalid_input,
-                      fmt::format("--debug-image: expected one image, found {}", options.images.size())});
-  }
+  if (const auto valid = check_debug_images(options); !valid) return fail(valid.error());
   const auto library = read_target_library(options.library);
   if (!library) return fail(library.error());
   nlohmann::json images = nlohmann::json::array();
@@ -194,8 +219,9 @@ void add_detect(Cli& cli, CLI::App& targets) {
       ->add_option("--decoder", options->config.decoder,
                    "likelihood, or plain: thresholds and no error correction, for comparison")
       ->transform(CLI::CheckedTransformer(decoders).description(""));
-  command->add_option("--debug-image", options->debug_image,
-                      "PNG to write: what was found, and what was rejected and why");
+  command->add_option(
+      "--debug-image", options->debug_image,
+      "PNG to write: what was found, and what was rejected and why; a folder takes one PNG for each image");
   command->add_option("IMAGE", options->images, "PNG or TIFF, 8 or 16 bit")->required();
 }
 
