@@ -13,6 +13,7 @@
 #include "node/detect/fit_dot.h"
 #include "node/detect/image_pyramid.h"
 #include "node/detect/scan_ring.h"
+#include "node/detect/sharpen.h"
 #include "node/detect/star_ellipse.h"
 
 namespace imprint {
@@ -100,23 +101,42 @@ class TargetSearch {
         trace_(trace) {}
 
   std::vector<DetectedTarget> run() {
-    for (int l = first_level(); l < pyramid_.levels(); ++l) collect_candidates(l);
+    choose_looks();
+    for (std::size_t i = 0; i < looks_.size(); ++i) collect_candidates(i);
     // The best ellipses first, so that the parts of a target's ring are known when their turn comes.
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.doubt < b.doubt; });
     for (const Candidate& candidate : candidates_) {
-      if (is_known(candidate.full) || examined_.has_like(candidate.full, candidate.level)) continue;
-      examined_.add(candidate.full, candidate.level);
-      const Rejection rejection = examine(candidate.level, candidate.star);
+      const Look& look = looks_[candidate.look];
+      if (is_known(candidate.full) || examined_.has_like(candidate.full, look.rank())) continue;
+      examined_.add(candidate.full, look.rank());
+      const Rejection rejection = examine(look, candidate.star);
       if (rejection != Rejection::none) reject(candidate.full, rejection);
     }
     return each_id_once();
   }
 
  private:
-  struct Candidate {
+  /// An image that dots are looked for in: a level of the pyramid, the image doubled, or a level with blur taken out.
+  struct Look {
+    GreyImage grey;
     int level = 0;
-    StarEllipse star;  // px of the level
+    double noise = 0.0;            // of its grey values
+    double removed_blur_px = 0.0;  // px of the image
+    BlobSize blobs = BlobSize::small;
+
+    [[nodiscard]] bool is_sharpened() const { return removed_blur_px > 0.0; }
+    /// Looks of one rank see the same.
+    [[nodiscard]] int rank() const { return is_sharpened() ? -100 - cvRound(8.0 * removed_blur_px) : level; }
+  };
+  struct DecodedDot {
+    Rejection rejection = Rejection::none;
+    RingScan scan;
+    DecodedRing ring;
+  };
+  struct Candidate {
+    std::size_t look = 0;
+    StarEllipse star;  // px of the look's level
     Ellipse full;      // px of the image
     double doubt = 0.0;
   };
@@ -131,30 +151,66 @@ class TargetSearch {
     return l;
   }
 
-  /// Ellipses of one level that stand on dark ground and have something like a ring.
-  void collect_candidates(int l) {
-    const GreyImage& level = pyramid_.level(l);
+  void choose_looks() {
+    const int first = first_level();
+    constexpr double tiny_px = 4.0;
+    if (first == 0 && config_.min_dot_px < tiny_px) {
+      looks_.push_back({GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled), -1, noise_, 0.0, BlobSize::tiny});
+    }
+    for (int l = first; l < pyramid_.levels(); ++l) {
+      looks_.push_back({pyramid_.level(l), l, noise_ / ImagePyramid::scale(l)});
+      if (l > 0) add_sharpened_looks(l);
+    }
+  }
+
+  /// Where even the sharpest edges are blurred over a px of the level, dots some px wide are lost in their rings: looks
+  /// with some of that blur taken out.
+  void add_sharpened_looks(int l) {
+    constexpr double rounding = 0.3;        // of grey values, as a standard deviation
+    constexpr double allowed_noise = 0.04;  // share of the grey values' range
+    const double noise = std::max(rounding, noise_) / ImagePyramid::scale(l);
+    const cv::Mat& level = pyramid_.level(l).mat();
+    // Sharp images have 0.3 here; the estimate grows more slowly than the blur where there are no long edges.
+    constexpr double blurred_px = 0.5;
+    if (edge_blur_px(level, noise) < blurred_px) return;
+    for (const double removed : {1.0, 1.5, 1.9}) {
+      double lowest = 0.0;
+      double highest = 0.0;
+      cv::minMaxLoc(level, &lowest, &highest);
+      if (const auto sharp = sharpen(level, removed, noise, allowed_noise * (highest - lowest))) {
+        looks_.push_back(
+            {GreyImage(sharp->image), l, sharp->noise_gain * noise, removed * ImagePyramid::scale(l), BlobSize::small});
+      }
+    }
+  }
+
+  /// Ellipses of one look that stand on dark ground and have something like a ring.
+  void collect_candidates(std::size_t index) {
+    const Look& look = looks_[index];
+    const double scale = ImagePyramid::scale(look.level);
     // A blurred or shaded ring shows fewer white places than it has: half of the fewest is asked for.
     const double least_white_ring = 0.5 * decoder_.least_white() / library_.bits;
     // What is lost in the noise of a level shows on a coarser one, or not at all.
     constexpr double least_signal_to_noise = 5.0;
     DetectConfig of_level = config_;
-    of_level.min_contrast = std::max(config_.min_contrast, least_signal_to_noise * noise_ / ImagePyramid::scale(l));
-    for (const cv::Point& blob : find_blobs(level.mat(), of_level.min_contrast, config_.max_candidates_per_tile)) {
-      const auto star = find_star_ellipse(level, {blob.x, blob.y}, of_level);
+    of_level.min_contrast = std::max(config_.min_contrast, least_signal_to_noise * look.noise);
+    const auto blobs = find_blobs(look.grey.mat(), of_level.min_contrast, config_.max_candidates_per_tile, look.blobs);
+    for (const cv::Point& blob : blobs) {
+      const Eigen::Vector2d start =
+          look.level < 0 ? ImagePyramid::to_level({blob.x, blob.y}, look.level) : Eigen::Vector2d(blob.x, blob.y);
+      const auto star = find_star_ellipse(look.grey, start, of_level);
       if (!star) continue;
-      const Ellipse full =
-          star->ellipse.scaled(ImagePyramid::scale(l), ImagePyramid::from_level(star->ellipse.center, l));
+      const Ellipse full = star->ellipse.scaled(scale, ImagePyramid::from_level(star->ellipse.center, look.level));
       const double diameter = diameter_of(full);
       if (diameter < 0.8 * config_.min_dot_px || diameter > 1.25 * config_.max_dot_px) continue;
-      const RingGlance glance = glance_at_ring(level, star->ellipse, star->white, star->black, library_.geometry);
+      const RingGlance glance = glance_at_ring(look.grey, star->ellipse, star->white, star->black, library_.geometry);
       constexpr double least_dark_valley = 0.75;
       if (glance.dark_valley < least_dark_valley) {
         reject(full, Rejection::no_dark_ground);
       } else if (glance.white_ring < least_white_ring) {
         reject(full, Rejection::no_ring);
       } else {
-        candidates_.push_back({l, *star, full, star->residual + (1.0 - glance.dark_valley)});
+        candidates_.push_back({index, *star, full, star->residual + (1.0 - glance.dark_valley)});
       }
     }
   }
@@ -165,28 +221,15 @@ class TargetSearch {
 
   /// From a rough ellipse to a decoded target, the cheapest doubt first: the fit at full resolution, which takes the
   /// longest, is left to what has a code already.
-  Rejection examine(int l, const StarEllipse& star) {
-    const GreyImage& level = pyramid_.level(l);
-    const auto rough = fit_dot(level, {star.ellipse, star.black, star.white - star.black});
+  Rejection examine(const Look& look, const StarEllipse& star) {
+    const auto rough = fit_dot(look.grey, {star.ellipse, star.black, star.white - star.black});
     if (!rough || rough->contrast < config_.min_contrast) return Rejection::poor_ellipse;
-    if (is_poor(*rough, noise_ / ImagePyramid::scale(l))) return Rejection::poor_ellipse;
-    FittedDot dot = at_full_resolution(*rough, l);
-    DecodedDot decoded = decode(dot);
+    if (is_poor(*rough, look.noise, flaws_before_ring)) return Rejection::poor_ellipse;
+    FittedDot dot = look.is_sharpened() ? from_level(*rough, look.level) : at_full_resolution(*rough, look.level);
+    DecodedDot decoded = decode(dot, look);
     if (decoded.rejection != Rejection::none) return decoded.rejection;
-    // Now that the code is known, the ring's light can be taken off; in small dots it reaches the window, and the first
-    // fit, which it disturbed, has to be mended twice.
-    constexpr double small_px = 10.0;
-    const int rounds = diameter_of(dot.ellipse) < small_px ? 3 : 1;
-    for (int round = 0; round < rounds; ++round) {
-      const auto ring_light = [&](const Eigen::Vector2d& place) {
-        return ring_light_at(place, dot, decoded.scan, decoded.ring.code, library_.geometry);
-      };
-      const auto fine = fit_dot(pyramid_.level(0), {dot.ellipse, dot.black, dot.contrast, dot.blur_px}, ring_light);
-      if (!fine || is_poor(*fine, noise_)) return Rejection::poor_ellipse;
-      dot = *fine;
-      decoded = decode(dot);
-      if (decoded.rejection != Rejection::none) return decoded.rejection;
-    }
+    const Rejection rejection = look.is_sharpened() ? fit_blurred(look, dot, decoded) : fit_finely(look, dot, decoded);
+    if (rejection != Rejection::none) return rejection;
     const DetectedTarget target{decoded.ring.id,
                                 {dot.ellipse.center.x(), dot.ellipse.center.y()},
                                 dot.sigma_px,
@@ -194,6 +237,73 @@ class TargetSearch {
                                 decoded.ring.distance};
     found_.push_back({target, dot.ellipse, decoded.ring.margin, decoded.ring.fit});
     return Rejection::none;
+  }
+
+  /// Now that the code is known, the ring's light can be taken off; in small dots it reaches the window, and the first
+  /// fit, which it disturbed, has to be mended twice.
+  Rejection fit_finely(const Look& look, FittedDot& dot, DecodedDot& decoded) {
+    constexpr double small_px = 10.0;
+    const int rounds = diameter_of(dot.ellipse) < small_px ? 3 : 1;
+    for (int round = 0; round < rounds; ++round) {
+      const auto fine =
+          fit_at_full_resolution(dot, [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
+      if (!fine || is_poor(*fine, noise_, is_tiny(dot) ? flaws_before_ring : flaws)) return Rejection::poor_ellipse;
+      dot = *fine;
+      decoded = decode(dot, look);
+      if (decoded.rejection != Rejection::none) return decoded.rejection;
+    }
+    return Rejection::none;
+  }
+
+  /// A dot of few px is not quite what a blurred ellipse is: its pixels are as large as its blur.
+  static bool is_tiny(const FittedDot& dot) {
+    constexpr double tiny_px = 5.0;
+    return 2.0 * axes_of(dot.ellipse).semi_minor_px < tiny_px;
+  }
+
+  [[nodiscard]] std::optional<FittedDot> fit_at_full_resolution(const FittedDot& dot,
+                                                                const LightAt& other_light) const {
+    if (!is_tiny(dot)) {
+      return fit_dot(pyramid_.level(0), {dot.ellipse, dot.black, dot.contrast, dot.blur_px}, other_light);
+    }
+    constexpr int doubled = -1;
+    const FittedDot in_doubled = to_level(dot, doubled);
+    auto fine = fit_dot(GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled),
+                        {in_doubled.ellipse, dot.black, dot.contrast, in_doubled.blur_px},
+                        [&](const Eigen::Vector2d& p) { return other_light(ImagePyramid::from_level(p, doubled)); });
+    if (!fine) return std::nullopt;
+    fine = from_level(*fine, doubled);
+    fine->sigma_px *= 2.0;  // four places to a pixel are still one reading
+    return fine;
+  }
+
+  /// The shape from the sharpened look, the centre from the image as it is, whose noise is known.
+  Rejection fit_blurred(const Look& look, FittedDot& dot, DecodedDot& decoded) {
+    constexpr int rounds = 2;
+    for (int round = 0; round < rounds; ++round) {
+      const FittedDot in_look = to_level(dot, look.level);
+      const auto fine = fit_dot(
+          look.grey, {in_look.ellipse, in_look.black, in_look.contrast, in_look.blur_px},
+          [&](const Eigen::Vector2d& p) { return ring_light(ImagePyramid::from_level(p, look.level), dot, decoded); });
+      if (!fine || is_poor(*fine, look.noise, flaws)) return Rejection::poor_ellipse;
+      dot = from_level(*fine, look.level);
+      decoded = decode(dot, look);
+      if (decoded.rejection != Rejection::none) return decoded.rejection;
+    }
+    FittedDot blurred = dot;
+    blurred.blur_px = std::hypot(dot.blur_px, look.removed_blur_px);
+    DecodedDot seen = decoded;
+    set_blur(seen.scan, blurred, library_.geometry);
+    const auto place = fit_dot(
+        pyramid_.level(0), {blurred.ellipse, blurred.black, blurred.contrast, blurred.blur_px},
+        [&](const Eigen::Vector2d& p) { return ring_light(p, blurred, seen); }, FitFreedom::place);
+    if (!place) return Rejection::poor_ellipse;
+    dot = *place;
+    return Rejection::none;
+  }
+
+  [[nodiscard]] double ring_light(const Eigen::Vector2d& place, const FittedDot& dot, const DecodedDot& decoded) const {
+    return ring_light_at(place, dot, decoded.scan, decoded.ring.code, library_.geometry);
   }
 
   /// A dot of one level in px of the image, without the width of the level's larger pixels.
@@ -206,9 +316,10 @@ class TargetSearch {
   }
 
   /// Whether the grey values are farther from a dot's than noise and small flaws make them.
-  static bool is_poor(const FittedDot& dot, double noise) {
-    constexpr double flaws = 0.12;  // share of the contrast
-    return dot.residual > std::hypot(flaws * dot.contrast, 2.0 * noise) ||
+  static constexpr double flaws = 0.12;             // share of the contrast
+  static constexpr double flaws_before_ring = 0.2;  // while the ring's light is still in it
+  static bool is_poor(const FittedDot& dot, double noise, double allowed_flaws) {
+    return dot.residual > std::hypot(allowed_flaws * dot.contrast, 2.0 * noise) ||
            dot.sigma_px > max_sigma_of_diameter * diameter_of(dot.ellipse);
   }
 
@@ -219,26 +330,38 @@ class TargetSearch {
     return std::hypot(of_dot, ring.profile) > limit;
   }
 
-  struct DecodedDot {
-    Rejection rejection = Rejection::none;
-    RingScan scan;
-    DecodedRing ring;
-  };
+  /// The level on which the dot's smaller radius is 5 to 10 px, or 2.5 to 5 of the doubled image.
+  [[nodiscard]] int scan_level(double semi_minor_px) const {
+    if (semi_minor_px < 2.5) return -1;
+    int l = 0;
+    while (l + 1 < pyramid_.levels() && semi_minor_px / ImagePyramid::scale(l) > 10.0) ++l;
+    return l;
+  }
 
-  DecodedDot decode(const FittedDot& dot) {
+  std::optional<RingScan> scan(const FittedDot& dot, const Look& look) const {
+    if (look.is_sharpened()) {
+      return scan_ring(look.grey, look.level, dot, library_.bits, library_.geometry,
+                       look.noise * ImagePyramid::scale(look.level), config_.max_unknown);
+    }
+    const int l = scan_level(axes_of(dot.ellipse).semi_minor_px);
+    const GreyImage image = l < 0 ? GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled) : pyramid_.level(l);
+    return scan_ring(image, l, dot, library_.bits, library_.geometry, noise_, config_.max_unknown);
+  }
+
+  DecodedDot decode(const FittedDot& dot, const Look& look) {
     const double diameter = diameter_of(dot.ellipse);
     if (diameter < config_.min_dot_px || diameter > config_.max_dot_px) return {Rejection::size, {}, {}};
     const EllipseAxes axes = axes_of(dot.ellipse);
     if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return {Rejection::poor_ellipse, {}, {}};
-    auto scan = scan_ring(pyramid_, dot, library_.bits, library_.geometry, noise_, config_.max_unknown);
-    if (!scan) return {Rejection::outside, {}, {}};
+    auto scanned = scan(dot, look);
+    if (!scanned) return {Rejection::outside, {}, {}};
     const bool plain = config_.decoder == Decoder::plain;
-    const DecodedRing ring = plain ? decoder_.decode_plainly(*scan) : decoder_.decode(*scan);
-    if (trace_ != nullptr) trace_->decoded.push_back({dot, *scan, ring});
+    const DecodedRing ring = plain ? decoder_.decode_plainly(*scanned) : decoder_.decode(*scanned);
+    if (trace_ != nullptr) trace_->decoded.push_back({dot, *scanned, ring});
     const bool accepted =
         ring.accepted &&
         (plain || (!is_doubtful(dot, ring) && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits)));
-    return {accepted ? Rejection::none : Rejection::no_code, std::move(*scan), ring};
+    return {accepted ? Rejection::none : Rejection::no_code, std::move(*scanned), ring};
   }
 
   /// Whether the place belongs to a target that is found: its dot or its ring.
@@ -282,6 +405,7 @@ class TargetSearch {
   }
 
   ImagePyramid pyramid_;
+  std::vector<Look> looks_;
   std::vector<Candidate> candidates_;
   ExaminedPlaces examined_;
   const TargetLibrary& library_;

@@ -9,18 +9,29 @@ namespace {
 
 constexpr int tile_px = 256;
 
-/// Strength of a pixel of the response, 8 or 16 bit.
-int strength(const cv::Mat& response, const cv::Point& p) {
-  return response.depth() == CV_16U ? response.at<std::uint16_t>(p) : response.at<std::uint8_t>(p);
+double strength(const cv::Mat& response, const cv::Point& p) {
+  switch (response.depth()) {
+    case CV_16U:
+      return response.at<std::uint16_t>(p);
+    case CV_32F:
+      return static_cast<double>(response.at<float>(p));
+    default:
+      return response.at<std::uint8_t>(p);
+  }
 }
 
-/// Centre minus surround, zero where that is negative.
-cv::Mat blob_response(const cv::Mat& level) {
+/// Centre minus surround; zero where that is negative, but for floats.
+cv::Mat blob_response(const cv::Mat& level, BlobSize size) {
   cv::Mat center;
   cv::Mat surround;
   cv::Mat response;
-  cv::GaussianBlur(level, center, {5, 5}, 1.0, 1.0, cv::BORDER_REPLICATE);
-  cv::GaussianBlur(level, surround, {11, 11}, 2.4, 2.4, cv::BORDER_REPLICATE);
+  if (size == BlobSize::tiny) {
+    cv::GaussianBlur(level, center, {3, 3}, 0.6, 0.6, cv::BORDER_REPLICATE);
+    cv::GaussianBlur(level, surround, {7, 7}, 1.3, 1.3, cv::BORDER_REPLICATE);
+  } else {
+    cv::GaussianBlur(level, center, {5, 5}, 1.0, 1.0, cv::BORDER_REPLICATE);
+    cv::GaussianBlur(level, surround, {11, 11}, 2.4, 2.4, cv::BORDER_REPLICATE);
+  }
   cv::subtract(center, surround, response);
   return response;
 }
@@ -29,8 +40,8 @@ void keep_strongest(std::vector<cv::Point>& points, std::size_t count, const cv:
   if (points.size() <= count) return;
   std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(count), points.end(),
                    [&response](const cv::Point& a, const cv::Point& b) {
-                     const int strength_a = strength(response, a);
-                     const int strength_b = strength(response, b);
+                     const double strength_a = strength(response, a);
+                     const double strength_b = strength(response, b);
                      if (strength_a != strength_b) return strength_a > strength_b;
                      return a.y != b.y ? a.y < b.y : a.x < b.x;  // the same choice on every machine
                    });
@@ -39,8 +50,8 @@ void keep_strongest(std::vector<cv::Point>& points, std::size_t count, const cv:
 
 }  // namespace
 
-std::vector<cv::Point> find_blobs(const cv::Mat& level, double min_contrast, int per_tile) {
-  const cv::Mat response = blob_response(level);
+std::vector<cv::Point> find_blobs(const cv::Mat& level, double min_contrast, int per_tile, BlobSize size) {
+  const cv::Mat response = blob_response(level, size);
   cv::Mat highest;
   cv::Mat is_maximum;
   cv::dilate(response, highest, {});

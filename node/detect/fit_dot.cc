@@ -131,7 +131,7 @@ struct NormalEquations {
 };
 
 /// Weights fall as 1 / (1 + (r/scale)^2)^2 of the residual (Geman-McClure); the cost is its own.
-NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& dot, double scale) {
+NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& dot, double scale, FitFreedom freedom) {
   NormalEquations equations;
   const DotModel model(dot);
   Vector gradient;
@@ -150,13 +150,19 @@ NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& 
   equations.matrix.diagonal().tail<2>().array() += hold;
   equations.right.tail<2>() -= hold * dot.shading;
   equations.cost += hold * dot.shading.squaredNorm();
+  if (freedom == FitFreedom::place) {
+    const double firm = 1e6 * (1.0 + equations.matrix.diagonal().maxCoeff());
+    equations.matrix.diagonal().segment<4>(2).array() += firm;
+    equations.matrix.diagonal().tail<2>().array() += firm;
+  }
   return equations;
 }
 
 /// Levenberg-Marquardt from `dot`; false when it leads nowhere.
-bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Dot& dot, NormalEquations& equations) {
+bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, FitFreedom freedom, Dot& dot,
+            NormalEquations& equations) {
   double damping = 1e-3;
-  equations = normal_equations(samples, dot, scale);
+  equations = normal_equations(samples, dot, scale, freedom);
   for (int i = 0; i < max_steps; ++i) {
     Matrix damped = equations.matrix;
     damped.diagonal() *= 1.0 + damping;
@@ -166,7 +172,7 @@ bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Dot
     const bool too_far = step.segment<3>(2).cwiseAbs().maxCoeff() > 0.7;
     const Dot next = dot.stepped(too_far ? Vector(step * 0.5) : step);
     if (!(next.shape.determinant() > 0.0)) return false;
-    const NormalEquations there = normal_equations(samples, next, scale);
+    const NormalEquations there = normal_equations(samples, next, scale, freedom);
     const bool better = there.cost <= equations.cost;
     if (better) {
       dot = next;
@@ -183,18 +189,29 @@ bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Dot
 
 }  // namespace
 
-FittedDot from_level(const FittedDot& dot, int level) {
-  const double scale = ImagePyramid::scale(level);
+namespace {
+
+FittedDot rescaled(const FittedDot& dot, double scale, const Eigen::Vector2d& center) {
   FittedDot full = dot;
-  full.ellipse = dot.ellipse.scaled(scale, ImagePyramid::from_level(dot.ellipse.center, level));
+  full.ellipse = dot.ellipse.scaled(scale, center);
   full.blur_px *= scale;
   full.sigma_px *= scale;
   full.shading /= scale;
-
   return full;
 }
 
-std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start, const LightAt& other_light) {
+}  // namespace
+
+FittedDot from_level(const FittedDot& dot, int level) {
+  return rescaled(dot, ImagePyramid::scale(level), ImagePyramid::from_level(dot.ellipse.center, level));
+}
+
+FittedDot to_level(const FittedDot& dot, int level) {
+  return rescaled(dot, 1.0 / ImagePyramid::scale(level), ImagePyramid::to_level(dot.ellipse.center, level));
+}
+
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start, const LightAt& other_light,
+                                 FitFreedom freedom) {
   const Ellipse& guess = start.ellipse;
   std::vector<Sample> samples = samples_of(image, guess);
   if (other_light) {
@@ -204,11 +221,11 @@ std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start, 
   Dot dot{Eigen::Vector2d::Zero(), guess.shape, start.blur_px, start.black, start.contrast, Eigen::Vector2d::Zero()};
   NormalEquations equations;
   // Twice: with a wide scale, then with the noise known.
-  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, 4, dot, equations) || !(dot.contrast > 0.0))
+  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, 4, freedom, dot, equations) || !(dot.contrast > 0.0))
     return std::nullopt;
   double noise = std::sqrt(equations.cost / std::max(1.0, equations.weight));
   const double scale = std::max(residual_scale * dot.contrast, 5.0 * noise);
-  if (!adjust(samples, scale, 10, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
+  if (!adjust(samples, scale, 10, freedom, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
 
   FittedDot fitted;
   fitted.ellipse = {guess.center + dot.center, dot.shape};

@@ -35,10 +35,14 @@ struct DotGuess {
 /// Nothing when it does not converge near the guess. In place of the edge points of [A] 2.3.4.
 /// `other_light`, where given, is light at a place that is not the dot's (its ring's, as blur spreads it), and is taken
 /// off first.
+/// `FitFreedom::place` holds the guess's shape and blur, which a heavily blurred dot alone does not tell apart.
 using LightAt = std::function<double(const Eigen::Vector2d&)>;
-std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& guess, const LightAt& other_light = {});
+enum class FitFreedom { all, place };
+std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& guess, const LightAt& other_light = {},
+                                 FitFreedom freedom = FitFreedom::all);
 
 /// The same dot in the px of level 0, from px of `level`.
 FittedDot from_level(const FittedDot& dot, int level);
+FittedDot to_level(const FittedDot& dot, int level);
 
 }  // namespace imprint

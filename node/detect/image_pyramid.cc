@@ -1,11 +1,34 @@
 #include "node/detect/image_pyramid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <opencv2/imgproc.hpp>
 
 namespace imprint {
+
+double GreyImage::cubic(const Eigen::Vector2d& p) const {
+  const int x = static_cast<int>(std::floor(p.x()));
+  const int y = static_cast<int>(std::floor(p.y()));
+  // Catmull-Rom: through the pixels, exact for slopes and curvature.
+  const auto weights = [](double t) {
+    return std::array{((2.0 - t) * t - 1.0) * t / 2.0, ((3.0 * t - 5.0) * t * t + 2.0) / 2.0,
+                      ((4.0 - 3.0 * t) * t + 1.0) * t / 2.0, (t - 1.0) * t * t / 2.0};
+  };
+  const auto u = weights(p.x() - x);
+  const auto v = weights(p.y() - y);
+  double sum = 0.0;
+  for (int j = 0; j < 4; ++j) {
+    const int row = std::clamp(y - 1 + j, 0, image_.rows - 1);
+    double along = 0.0;
+    for (int i = 0; i < 4; ++i) {
+      along += u[static_cast<std::size_t>(i)] * stored(std::clamp(x - 1 + i, 0, image_.cols - 1), row);
+    }
+    sum += v[static_cast<std::size_t>(j)] * along;
+  }
+  return sum;
+}
 
 ImagePyramid::ImagePyramid(const cv::Mat& image, int levels) {
   constexpr int smallest_side_px = 12;  // a target does not fit into less

@@ -24,18 +24,9 @@ double row_radius(const TargetGeometry& geometry, int row) {
          geometry.dot_radius;
 }
 
-/// The level on which the dot's smaller radius is 5 to 10 px.
-int scan_level(const ImagePyramid& pyramid, double semi_minor_px) {
-  int l = 0;
-  while (l + 1 < pyramid.levels() && semi_minor_px / ImagePyramid::scale(l) > 10.0) ++l;
-  return l;
-}
-
 /// Mean reading of each column; NaN where the ring leaves the image.
-std::vector<double> scan_columns(const ImagePyramid& pyramid, const FittedDot& dot, int columns,
+std::vector<double> scan_columns(const GreyImage& level, int l, const FittedDot& dot, int columns,
                                  const TargetGeometry& geometry) {
-  const int l = scan_level(pyramid, axes_of(dot.ellipse).semi_minor_px);
-  const GreyImage& level = pyramid.level(l);
   const Eigen::Vector2d center = ImagePyramid::to_level(dot.ellipse.center, l);
   const Eigen::Matrix2d frame = frame_of(dot.ellipse) / ImagePyramid::scale(l);
   std::vector<double> readings(static_cast<std::size_t>(columns));
@@ -47,7 +38,7 @@ std::vector<double> scan_columns(const ImagePyramid& pyramid, const FittedDot& d
     for (int row = 0; row < rows; ++row) {
       const Eigen::Vector2d p = center + row_radius(geometry, row) * direction;
       if (!level.contains(p)) continue;
-      sum += level.bilinear(p);
+      sum += level.at(p);
       ++inside;
     }
     // At the border of the image the inner rows may still tell.
@@ -133,10 +124,10 @@ double BitResponse::column_reading(double offset, int before, int bit, int after
   return floor + light * radial * (left * before + (1.0 - left - right) * bit + right * after);
 }
 
-std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
+std::optional<RingScan> scan_ring(const GreyImage& image, int level, const FittedDot& dot, int bits,
                                   const TargetGeometry& geometry, double noise, double max_unknown) {
   const int count = bits * columns_per_bit;
-  const std::vector<double> columns = scan_columns(pyramid, dot, count, geometry);
+  const std::vector<double> columns = scan_columns(image, level, dot, count, geometry);
   const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
   if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
   RingScan scan;
@@ -159,6 +150,15 @@ std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& 
       std::numbers::pi * axes.semi_major_px * axes.semi_minor_px * (outer * outer - inner * inner) / bits * 0.67;
   scan.noise = noise / dot.contrast / std::sqrt(std::max(1.0, area));
   return scan;
+}
+
+void set_blur(RingScan& scan, const FittedDot& dot, const TargetGeometry& geometry) {
+  const int bits = static_cast<int>(scan.response.size());
+  for (std::size_t i = 0; i < scan.response.size(); ++i) {
+    const double light = scan.response[i].light;
+    scan.response[i] = response_at(dot, bits, geometry, std::atan2(scan.place[i].y(), scan.place[i].x()));
+    scan.response[i].light = light;
+  }
 }
 
 double ring_light_at(const Eigen::Vector2d& place, const FittedDot& dot, const RingScan& scan, std::uint32_t code,
@@ -204,8 +204,8 @@ RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double whi
     const Eigen::Vector2d direction = frame * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     const Eigen::Vector2d in_valley = dot.center + 0.5 * (1.0 + inner) * direction;
     const Eigen::Vector2d on_ring = dot.center + 0.5 * (inner + outer) * direction;
-    if (level.contains(in_valley) && level.bilinear(in_valley) < half) ++dark;
-    if (level.contains(on_ring) && level.bilinear(on_ring) > black + 0.35 * (white - black)) ++bright;
+    if (level.contains(in_valley) && level.at(in_valley) < half) ++dark;
+    if (level.contains(on_ring) && level.at(on_ring) > black + 0.35 * (white - black)) ++bright;
   }
   return {static_cast<double>(dark) / places, static_cast<double>(bright) / places};
 }

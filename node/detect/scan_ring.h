@@ -40,11 +40,15 @@ struct RingScan {
 };
 
 /// Scans the ring of a dot densely (24 columns a bit, 7 rows; [A] 2.3.5 has 24 and 12) in the frame of its ellipse and
-/// turns the columns so that the sum of the mean deviations within the bits is least. `dot` is in px of level 0; the
-/// scan takes the pyramid level whose pixels fit the dot's size, so that in large rings noise is averaged out.
-/// `noise` is the image's. Nothing when more than `max_unknown` of the ring lies outside the image.
-std::optional<RingScan> scan_ring(const ImagePyramid& pyramid, const FittedDot& dot, int bits,
+/// turns the columns so that the sum of the mean deviations within the bits is least. `dot` is in px of level 0;
+/// `image` is of pyramid level `level`, best one whose pixels fit the dot's size, so that in large rings noise is
+/// averaged out. `noise` is the whole image's, per px of level 0. Nothing when more than `max_unknown` of the ring lies
+/// outside the image.
+std::optional<RingScan> scan_ring(const GreyImage& image, int level, const FittedDot& dot, int bits,
                                   const TargetGeometry& geometry, double noise, double max_unknown);
+
+/// Has the responses of a scan be those under the blur of `dot`.
+void set_blur(RingScan& scan, const FittedDot& dot, const TargetGeometry& geometry);
 
 /// Light of the ring of `code` (its first bit where the scan's is) at a place of the image, in grey levels: what blur
 /// carries of it over the edge of the dot.

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
+
+#include <Eigen/LU>
 
 namespace imprint {
 namespace {
@@ -35,9 +38,10 @@ struct EdgePoints {
 };
 
 /// Walks from `start` until the valley behind the first fall has been seen; the distance in px at which the grey level
-/// passes half-way down, or a negative number. Steps are half a px, farther out one: a long edge is a blunt one.
+/// passes half-way down, or a negative number; lowers `lowest_seen` to the lowest level met. Steps are half a px,
+/// farther out one: a long edge is a blunt one.
 double first_fall_px(const GreyImage& level, const Eigen::Vector2d& start, const Eigen::Vector2d& direction, double top,
-                     double min_contrast) {
+                     double min_contrast, double* lowest_seen) {
   constexpr int fine_steps = 12;
   constexpr int max_steps = 40;  // 34 px: an ellipse with the largest minor axis of a level and a ratio of six
   const auto distance_px = [](int n) { return n <= fine_steps ? 0.5 * n : n - 0.5 * fine_steps; };
@@ -48,7 +52,7 @@ double first_fall_px(const GreyImage& level, const Eigen::Vector2d& start, const
   for (; n < max_steps; ++n) {
     const Eigen::Vector2d p = start + distance_px(n) * direction;
     if (!level.contains(p)) break;
-    const double value = level.bilinear(p);
+    const double value = level.at(p);
     values[static_cast<std::size_t>(n)] = value;
     lowest = std::min(lowest, value);
     const double depth = top - lowest;
@@ -58,6 +62,7 @@ double first_fall_px(const GreyImage& level, const Eigen::Vector2d& start, const
     const bool past_valley = n >= half_at + 3 && distance_px(n) >= 2.0 * distance_px(half_at);
     if (value > lowest + 0.4 * depth || past_valley) break;
   }
+  *lowest_seen = std::min(*lowest_seen, lowest);
   if (top - lowest < min_contrast || half_at == 0) return -1.0;
   const double half = 0.5 * (top + lowest);
   while (half_at < n && values[static_cast<std::size_t>(half_at)] > half) ++half_at;
@@ -68,39 +73,89 @@ double first_fall_px(const GreyImage& level, const Eigen::Vector2d& start, const
   return distance_px(half_at - 1) + share * (distance_px(half_at) - distance_px(half_at - 1));
 }
 
-/// First round: nothing is known but a place inside.
-std::optional<Ellipse> rough_ellipse(const GreyImage& level, const Eigen::Vector2d& start, double min_contrast) {
-  const double top = level.bilinear(start);
-  EdgePoints edge;
-  double mean = 0.0;
-  double smallest = std::numeric_limits<double>::max();
+bool has_allowed_axes(const Ellipse& ellipse, const DetectConfig& config) {
+  const EllipseAxes axes = axes_of(ellipse);
+  return axes.semi_minor_px >= min_level_semi_minor_px && axes.semi_minor_px <= max_level_semi_minor_px &&
+         axes.semi_major_px <= config.max_axis_ratio * axes.semi_minor_px;
+}
+
+/// What the first round's rays saw from a place inside.
+struct FirstRays {
+  EdgePoints edge;  // px from the start
+  double mean_px = 0.0;
+  double lowest = 0.0;  // of the grey levels seen
+};
+
+/// Nothing when too many rays meet no edge.
+std::optional<FirstRays> cast_first_rays(const GreyImage& level, const Eigen::Vector2d& start, double top,
+                                         double min_contrast) {
+  FirstRays first;
+  first.lowest = top;
   constexpr int rough_rays = rays / 2;
   for (int i = 0; i < rough_rays; ++i) {
     // Round the clock in steps of 150 degrees: what is no ellipse fails on the first few.
     const auto ray = static_cast<std::size_t>(2 * (i * 5 % rough_rays));
-    const double r = first_fall_px(level, start, directions.unit[ray], top, min_contrast);
+    const double r = first_fall_px(level, start, directions.unit[ray], top, min_contrast, &first.lowest);
     if (r > 0.0) {
-      edge.add(r * directions.unit[ray]);
-      mean += r;
-      smallest = std::min(smallest, r);
-    } else if (i + 1 - static_cast<int>(edge.count) > max_failed_rays / 2) {
+      first.edge.add(r * directions.unit[ray]);
+      first.mean_px += r;
+    } else if (i + 1 - static_cast<int>(first.edge.count) > max_failed_rays / 2) {
       return std::nullopt;
     }
-    // Some ray must be as short as the minor axis allows, wherever in the ellipse it starts.
-    if (i + 1 == rough_rays / 2 && smallest > 1.3 * max_level_semi_minor_px) return std::nullopt;
   }
-  mean /= static_cast<double>(edge.count);
-  for (std::size_t i = 0; i < edge.count; ++i) edge.points[i] /= mean;
-  const auto ellipse =
-      fit_ellipse({edge.points.data(), edge.count}, {edge.weights.data(), edge.count}, Ellipse::circle(start, mean));
+  first.mean_px /= static_cast<double>(first.edge.count);
+  return first;
+}
+
+/// The ellipse through the ends of the rays; nothing when they are nowhere near one, as those of most spots of a
+/// texture, or those of a long ellipse, whose far ends few rays meet.
+std::optional<Ellipse> ellipse_through(const FirstRays& first, const Eigen::Vector2d& start) {
+  EdgePoints edge = first.edge;
+  for (std::size_t i = 0; i < edge.count; ++i) edge.points[i] /= first.mean_px;
+  const auto ellipse = fit_ellipse({edge.points.data(), edge.count}, {edge.weights.data(), edge.count},
+                                   Ellipse::circle(start, first.mean_px));
   if (!ellipse) return std::nullopt;
-  // Most spots of a texture end here: their outline is nowhere near an ellipse.
   constexpr double near = 0.3;  // radii
   std::size_t far_points = 0;
   for (std::size_t i = 0; i < edge.count; ++i) {
-    if (std::abs(ellipse->radius_of(start + mean * edge.points[i]) - 1.0) > near) ++far_points;
+    if (std::abs(ellipse->radius_of(start + first.edge.points[i]) - 1.0) > near) ++far_points;
   }
   return far_points > edge.count / 4 ? std::nullopt : ellipse;
+}
+
+/// The ellipse with the second moments of the pixels round `start` that hang together and are brighter than `half`;
+/// nothing when they are more than an ellipse of a level can have.
+std::optional<Ellipse> ellipse_of_spot(const GreyImage& level, const Eigen::Vector2d& start, double half,
+                                       double max_axis_ratio) {
+  const auto most = static_cast<std::size_t>(std::numbers::pi * max_level_semi_minor_px * max_level_semi_minor_px *
+                                             std::min(4.0, max_axis_ratio));
+  std::vector<cv::Point> spot{{cvRound(start.x()), cvRound(start.y())}};
+  const int reach = static_cast<int>(max_level_semi_minor_px * max_axis_ratio);
+  const cv::Rect window =
+      cv::Rect(spot[0].x - reach, spot[0].y - reach, 2 * reach + 1, 2 * reach + 1) & cv::Rect({}, level.mat().size());
+  std::vector<bool> seen(static_cast<std::size_t>(window.area()), false);
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  for (std::size_t next = 0; next < spot.size(); ++next) {
+    const cv::Point p = spot[next];
+    const Eigen::Vector2d d(p.x - spot[0].x, p.y - spot[0].y);
+    sum += d;
+    squares += d * d.transpose();
+    for (const cv::Point& q : {p + cv::Point(1, 0), p - cv::Point(1, 0), p + cv::Point(0, 1), p - cv::Point(0, 1)}) {
+      if (!window.contains(q) || level.pixel(q.x, q.y) <= half) continue;
+      const auto at = static_cast<std::size_t>((q.y - window.y) * window.width + q.x - window.x);
+      if (seen[at]) continue;
+      seen[at] = true;
+      spot.push_back(q);
+    }
+    if (spot.size() > most) return std::nullopt;
+  }
+  const auto n = static_cast<double>(spot.size());
+  const Eigen::Vector2d mean = sum / n;
+  constexpr double pixel_variance = 1.0 / 12.0;
+  const Eigen::Matrix2d covariance =
+      squares / n - mean * mean.transpose() + pixel_variance * Eigen::Matrix2d::Identity();
+  return Ellipse{Eigen::Vector2d(spot[0].x, spot[0].y) + mean, (4.0 * covariance).inverse()};
 }
 
 /// Later rounds: rays in the frame of the ellipse so far, which is the unit circle there.
@@ -115,7 +170,7 @@ class FramedStar {
     for (const double radius : {0.0, 0.3, 0.55}) {
       for (std::size_t i = 0; i < rays; i += radius == 0.0 ? rays : rays / 6) {
         const Eigen::Vector2d p = place(radius, i);
-        if (level_.contains(p)) inside[n++] = level_.bilinear(p);
+        if (level_.contains(p)) inside[n++] = level_.at(p);
       }
     }
     if (n < 5) return false;
@@ -126,7 +181,7 @@ class FramedStar {
     std::array<double, rays> sorted{};
     for (std::size_t i = 0; i < rays; ++i) {
       valley_[i] = valley(i);
-      if (valley_[i] >= 0.0) sorted[seen++] = valley_[i];
+      if (!std::isnan(valley_[i])) sorted[seen++] = valley_[i];
     }
     if (seen + max_failed_rays < rays) return false;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(seen / 2),
@@ -139,7 +194,7 @@ class FramedStar {
     EdgePoints edge;
     for (std::size_t i = 0; i < rays; ++i) {
       // A ray whose valley is as bright as the dot shows something that covers the edge.
-      if (valley_[i] < 0.0 || white_ - valley_[i] < 0.5 * (white_ - black_)) continue;
+      if (std::isnan(valley_[i]) || white_ - valley_[i] < 0.5 * (white_ - black_)) continue;
       const double r = crossing(i, 0.5 * (white_ + valley_[i]));
       if (r > 0.0) edge.add(r * directions.unit[i]);
     }
@@ -154,12 +209,13 @@ class FramedStar {
     return guess_.center + frame_ * (radius * directions.unit[ray]);
   }
 
+  /// Not a number where the image ends.
   [[nodiscard]] double valley(std::size_t ray) const {
     double sum = 0.0;
     for (const double radius : {1.4, 1.5, 1.6}) {
       const Eigen::Vector2d p = place(radius, ray);
-      if (!level_.contains(p)) return -1.0;
-      sum += level_.bilinear(p);
+      if (!level_.contains(p)) return std::numeric_limits<double>::quiet_NaN();
+      sum += level_.at(p);
     }
     return sum / 3.0;
   }
@@ -170,9 +226,9 @@ class FramedStar {
     constexpr double step = 0.08;
     constexpr int steps = 14;
     double best = -1.0;
-    double last = level_.bilinear(place(first, ray));
+    double last = level_.at(place(first, ray));
     for (int k = 1; k <= steps; ++k) {
-      const double value = level_.bilinear(place(first + k * step, ray));
+      const double value = level_.at(place(first + k * step, ray));
       if (last > half && value <= half) {
         const double r = first + step * (k - 1 + (last - half) / (last - value));
         if (best < 0.0 || std::abs(r - 1.0) < std::abs(best - 1.0)) best = r;
@@ -189,12 +245,6 @@ class FramedStar {
   double black_ = 0.0;
   std::array<double, rays> valley_{};
 };
-
-bool has_allowed_axes(const Ellipse& ellipse, const DetectConfig& config) {
-  const EllipseAxes axes = axes_of(ellipse);
-  return axes.semi_minor_px >= min_level_semi_minor_px && axes.semi_minor_px <= max_level_semi_minor_px &&
-         axes.semi_major_px <= config.max_axis_ratio * axes.semi_minor_px;
-}
 
 /// Fits, then fits again without the points that lie far off the first fit (a hidden or frayed part of the edge).
 std::optional<Ellipse> fit_without_outliers(EdgePoints& edge, const Ellipse& guess, double* residual) {
@@ -218,12 +268,8 @@ std::optional<Ellipse> fit_without_outliers(EdgePoints& edge, const Ellipse& gue
   return ellipse;
 }
 
-}  // namespace
-
-std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen::Vector2d& start,
-                                             const DetectConfig& config) {
-  if (!level.contains(start)) return std::nullopt;
-  auto ellipse = rough_ellipse(level, start, config.min_contrast);
+/// The later rounds, from a rough ellipse on.
+std::optional<StarEllipse> refine(const GreyImage& level, std::optional<Ellipse> ellipse, const DetectConfig& config) {
   StarEllipse star;
   constexpr int rounds = 3;
   for (int round = 0; round < rounds; ++round) {
@@ -240,6 +286,20 @@ std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen
   if (!ellipse || !has_allowed_axes(*ellipse, config) || star.residual > config.max_residual) return std::nullopt;
   star.ellipse = *ellipse;
   return star;
+}
+
+}  // namespace
+
+std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen::Vector2d& start,
+                                             const DetectConfig& config) {
+  if (!level.contains(start)) return std::nullopt;
+  const double top = level.at(start);
+  const auto first = cast_first_rays(level, start, top, config.min_contrast);
+  if (!first) return std::nullopt;
+  if (auto star = refine(level, ellipse_through(*first, start), config)) return star;
+  // From the end of a long dot rays see little of it.
+  const double half = 0.5 * (top + first->lowest);
+  return refine(level, ellipse_of_spot(level, start, half, config.max_axis_ratio), config);
 }
 
 }  // namespace imprint
