@@ -45,11 +45,14 @@ bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
   return true;
 }
 
+/// Least rank of a look that shows the image as it is: its level. Sharpened looks have ranks of their own below it.
+constexpr int plain_rank = -1;
+
 /// Ellipses already looked at: one dot is found from several maxima, on two levels. On a finer level it gets another
 /// look, since the coarser one may have had too few pixels.
 class ExaminedPlaces {
  public:
-  [[nodiscard]] bool has_like(const Ellipse& ellipse, int level) const {
+  [[nodiscard]] bool has_like(const Ellipse& ellipse, int rank) const {
     const double diameter = diameter_of(ellipse);
     const auto [x, y] = cell_of(ellipse.center);
     for (int dy = -1; dy <= 1; ++dy) {
@@ -59,7 +62,9 @@ class ExaminedPlaces {
         for (const Place& known : cell->second) {
           constexpr double near = 0.2;      // radii
           constexpr double similar = 0.15;  // share of the diameter
-          if (known.level <= level && known.ellipse.radius_of(ellipse.center) < near &&
+          const bool seen_as_well =
+              known.rank == rank || (rank >= plain_rank && known.rank <= rank && known.rank >= plain_rank);
+          if (seen_as_well && known.ellipse.radius_of(ellipse.center) < near &&
               std::abs(diameter_of(known.ellipse) - diameter) < similar * diameter) {
             return true;
           }
@@ -68,12 +73,12 @@ class ExaminedPlaces {
     }
     return false;
   }
-  void add(const Ellipse& ellipse, int level) { cells_[cell_of(ellipse.center)].push_back({ellipse, level}); }
+  void add(const Ellipse& ellipse, int rank) { cells_[cell_of(ellipse.center)].push_back({ellipse, rank}); }
 
  private:
   struct Place {
     Ellipse ellipse;
-    int level;
+    int rank;
   };
   static std::pair<int, int> cell_of(const Eigen::Vector2d& p) {
     constexpr double cell_px = 32.0;
@@ -203,7 +208,9 @@ class TargetSearch {
       const Ellipse full = star->ellipse.scaled(scale, ImagePyramid::from_level(star->ellipse.center, look.level));
       const double diameter = diameter_of(full);
       if (diameter < 0.8 * config_.min_dot_px || diameter > 1.25 * config_.max_dot_px) continue;
-      const RingGlance glance = glance_at_ring(look.grey, star->ellipse, star->white, star->black, library_.geometry);
+      const double least_light = look.is_sharpened() ? 0.2 : 0.35;
+      const RingGlance glance =
+          glance_at_ring(look.grey, star->ellipse, star->white, star->black, least_light, library_.geometry);
       constexpr double least_dark_valley = 0.75;
       if (glance.dark_valley < least_dark_valley) {
         reject(full, Rejection::no_dark_ground);
@@ -280,15 +287,17 @@ class TargetSearch {
   /// The shape from the sharpened look, the centre from the image as it is, whose noise is known.
   Rejection fit_blurred(const Look& look, FittedDot& dot, DecodedDot& decoded) {
     constexpr int rounds = 2;
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < rounds; ++round) {  // as long as it mends something
       const FittedDot in_look = to_level(dot, look.level);
       const auto fine = fit_dot(
           look.grey, {in_look.ellipse, in_look.black, in_look.contrast, in_look.blur_px},
           [&](const Eigen::Vector2d& p) { return ring_light(ImagePyramid::from_level(p, look.level), dot, decoded); });
-      if (!fine || is_poor(*fine, look.noise, flaws)) return Rejection::poor_ellipse;
-      dot = from_level(*fine, look.level);
-      decoded = decode(dot, look);
-      if (decoded.rejection != Rejection::none) return decoded.rejection;
+      if (!fine || is_poor(*fine, look.noise, flaws)) break;
+      const FittedDot mended = from_level(*fine, look.level);
+      DecodedDot again = decode(mended, look);
+      if (again.rejection != Rejection::none || again.ring.id != decoded.ring.id) break;
+      dot = mended;
+      decoded = std::move(again);
     }
     FittedDot blurred = dot;
     blurred.blur_px = std::hypot(dot.blur_px, look.removed_blur_px);
@@ -338,10 +347,11 @@ class TargetSearch {
     return l;
   }
 
-  std::optional<RingScan> scan(const FittedDot& dot, const Look& look) const {
+  std::optional<RingScan> scan(const FittedDot& dot, const Look& look,
+                               std::optional<int> first_column = std::nullopt) const {
     if (look.is_sharpened()) {
       return scan_ring(look.grey, look.level, dot, library_.bits, library_.geometry,
-                       look.noise * ImagePyramid::scale(look.level), config_.max_unknown);
+                       look.noise * ImagePyramid::scale(look.level), config_.max_unknown, first_column);
     }
     const int l = scan_level(axes_of(dot.ellipse).semi_minor_px);
     const GreyImage image = l < 0 ? GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled) : pyramid_.level(l);
@@ -356,7 +366,15 @@ class TargetSearch {
     auto scanned = scan(dot, look);
     if (!scanned) return {Rejection::outside, {}, {}};
     const bool plain = config_.decoder == Decoder::plain;
-    const DecodedRing ring = plain ? decoder_.decode_plainly(*scanned) : decoder_.decode(*scanned);
+    DecodedRing ring = plain ? decoder_.decode_plainly(*scanned) : decoder_.decode(*scanned);
+    if (!plain && look.is_sharpened()) {
+      const RingDecoder::Correlated correlated = decoder_.correlate(*scanned);
+      ring = correlated.ring;
+      scanned = scan(dot, look, scanned->first_column + correlated.turn);
+      if (!scanned) return {Rejection::outside, {}, {}};
+      const double response = scanned->response.front().own;
+      set_light(*scanned, Eigen::Vector2d::Zero(), correlated.light / std::max(0.1, response));
+    }
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scanned, ring});
     const bool accepted =
         ring.accepted &&

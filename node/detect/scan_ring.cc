@@ -125,13 +125,16 @@ double BitResponse::column_reading(double offset, int before, int bit, int after
 }
 
 std::optional<RingScan> scan_ring(const GreyImage& image, int level, const FittedDot& dot, int bits,
-                                  const TargetGeometry& geometry, double noise, double max_unknown) {
+                                  const TargetGeometry& geometry, double noise, double max_unknown,
+                                  std::optional<int> first_column_given) {
   const int count = bits * columns_per_bit;
   const std::vector<double> columns = scan_columns(image, level, dot, count, geometry);
   const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
   if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
   RingScan scan;
-  const std::size_t first = first_column(columns, bits, &scan.deviation);
+  std::size_t first = first_column(columns, bits, &scan.deviation);
+  if (first_column_given) first = static_cast<std::size_t>(*first_column_given % count);
+  scan.first_column = static_cast<int>(first);
   for (std::size_t i = 0; i < columns.size(); ++i) scan.columns.push_back(columns[(first + i) % columns.size()]);
   scan.first_angle = two_pi * static_cast<double>(first) / count;
   for (int bit = 0; bit < bits; ++bit) {
@@ -190,7 +193,7 @@ void set_light(RingScan& scan, const Eigen::Vector2d& slope, double level) {
   }
 }
 
-RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black,
+RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black, double least_light,
                           const TargetGeometry& geometry) {
   constexpr int places = 36;
   const Eigen::Matrix2d frame = frame_of(dot);
@@ -205,7 +208,7 @@ RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double whi
     const Eigen::Vector2d in_valley = dot.center + 0.5 * (1.0 + inner) * direction;
     const Eigen::Vector2d on_ring = dot.center + 0.5 * (inner + outer) * direction;
     if (level.contains(in_valley) && level.at(in_valley) < half) ++dark;
-    if (level.contains(on_ring) && level.at(on_ring) > black + 0.35 * (white - black)) ++bright;
+    if (level.contains(on_ring) && level.at(on_ring) > black + least_light * (white - black)) ++bright;
   }
   return {static_cast<double>(dark) / places, static_cast<double>(bright) / places};
 }

@@ -33,6 +33,7 @@ struct RingScan {
   std::vector<double> reading;  ///< 0: as black as the ground of the dot; 1: as white as the dot; NaN: outside
   std::vector<BitResponse> response;
   std::vector<Eigen::Vector2d> place;  ///< middle of each bit in the frame of the dot, where that is the unit circle
+  int first_column = 0;                ///< where the first bit begins, in columns of the frame of the dot
   double first_angle = 0.0;            ///< where the first bit begins, in the frame of the dot
   double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
   std::vector<double> columns;         ///< mean reading of each column from the first bit's beginning on
@@ -45,7 +46,8 @@ struct RingScan {
 /// averaged out. `noise` is the whole image's, per px of level 0. Nothing when more than `max_unknown` of the ring lies
 /// outside the image.
 std::optional<RingScan> scan_ring(const GreyImage& image, int level, const FittedDot& dot, int bits,
-                                  const TargetGeometry& geometry, double noise, double max_unknown);
+                                  const TargetGeometry& geometry, double noise, double max_unknown,
+                                  std::optional<int> first_column = std::nullopt);
 
 /// Has the responses of a scan be those under the blur of `dot`.
 void set_blur(RingScan& scan, const FittedDot& dot, const TargetGeometry& geometry);
@@ -67,7 +69,8 @@ struct RingGlance {
   double dark_valley = 0.0;
   double white_ring = 0.0;
 };
-RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black,
+/// `least_light`: share of the dot's light from which on a place of the ring counts as white.
+RingGlance glance_at_ring(const GreyImage& level, const Ellipse& dot, double white, double black, double least_light,
                           const TargetGeometry& geometry);
 
 }  // namespace imprint
