@@ -10,6 +10,7 @@
 #include <Eigen/Cholesky>
 
 #include "lib/targets/code_distance.h"
+#include "node/detect/ring_evidence.h"
 
 namespace imprint {
 namespace {
@@ -21,6 +22,8 @@ constexpr double cover_density = 0.4;       // of a reading that may be anything
 constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
 constexpr double max_profile =
     0.15;                         // rms of the columns; spots of a texture have no edges where a code has them, ours
+// Bits that are amiss each for itself, by their likelihood: more, and no cover explains the ring.
+constexpr double hopeless = 32.0;
 constexpr double max_fit = 0.15;  // rms of the known bits; rings in clutter have levels at random
 
 int bit_of(std::uint32_t code, int bits, int index) {
@@ -37,6 +40,12 @@ double log_likelihood(double reading, double expected, double sigma) {
 double log_likelihood(const RingScan& scan, std::size_t bit, int before, int own, int after) {
   const double expected = scan.response[bit].reading(before, own, after);
   return log_likelihood(scan.reading[bit], expected, std::hypot(black_sigma, white_sigma * expected, scan.noise));
+}
+
+/// Of a ring that reads as its code says.
+double perfect_likelihood(const RingScan& scan) {
+  const double sigma = std::hypot(0.5 * (black_sigma + white_sigma), scan.noise);
+  return static_cast<double>(scan.reading.size()) * log_likelihood(0.0, 0.0, sigma);
 }
 
 double bit_contrast(const RingScan& scan, std::size_t bit) {
@@ -190,12 +199,30 @@ RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
 
 struct RingDecoder::Match {
   double log_likelihood = -std::numeric_limits<double>::max();
-  int id = 0;
-  std::uint32_t code = 0;
+  std::size_t code = 0;      // index
+  std::uint32_t turned = 0;  // the code from the scan's first bit on
 };
+
+/// Where the bits begin was read off a ring with all that covers it: the code tells it better. Whether it moved.
+bool RingDecoder::turn_to_fit(RingScan& scan, const DecodedRing& ring) {
+  constexpr int most = columns_per_bit / 4;
+  int best = 0;
+  double least = ring.cost;
+  RingEvidence evidence(scan);
+  for (int columns = -most; columns <= most; ++columns) {
+    evidence.turn(columns);
+    const double cost = evidence.explain(ring.code).cost;
+    if (cost >= least) continue;
+    least = cost;
+    best = columns;
+  }
+  if (best != 0) scan = turned(scan, best);
+  return best != 0;
+}
 
 DecodedRing RingDecoder::decode(RingScan& scan) const {
   DecodedRing ring = decode_once(scan);
+  if (ring.cost < hopeless && turn_to_fit(scan, ring)) ring = decode_once(scan);
   constexpr int rounds = 2;
   constexpr double even_enough = 0.05;
   for (int round = 0; round < rounds && (!ring.accepted || ring.profile > even_enough); ++round) {
@@ -263,34 +290,74 @@ DecodedRing RingDecoder::decode_plainly(const RingScan& scan) const {
   return ring;
 }
 
-DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
+/// The colours that the bits show each for itself, without those that may be either: two masks, the first bit highest.
+struct PlainBits {
+  std::uint32_t white = 0;
+  std::uint32_t clear = 0;
+};
+
+PlainBits plain_bits(const RingScan& scan) {
+  PlainBits bits;
+  for (std::size_t i = 0; i < scan.reading.size(); ++i) {
+    const double share = (scan.reading[i] - scan.response[i].floor) / std::max(0.1, scan.response[i].light);
+    constexpr double black = 0.3;
+    constexpr double white = 0.7;
+    bits.white = bits.white << 1U | (share > white ? 1U : 0U);
+    bits.clear = bits.clear << 1U | (share < black || share > white ? 1U : 0U);
+  }
+  return bits;
+}
+
+/// Codes and turns that two covers at most could reconcile with what the bits show, the likeliest first.
+std::vector<RingDecoder::Match> RingDecoder::likeliest(const RingScan& scan) const {
   const StretchTables tables(scan, bits_);
-  Match best;
-  Match second;
-  for (const TargetCode& code : codes_) {
-    Match match;
-    match.id = code.id;
+  const PlainBits seen = plain_bits(scan);
+  constexpr int most_covers = 2;
+  constexpr std::size_t kept = 80;
+  std::vector<Match> matches;
+  for (std::size_t i = 0; i < codes_.size(); ++i) {
     for (int k = 0; k < bits_; ++k) {
-      const std::uint32_t turned = rotated(code.code, bits_, k);
-      const double value = tables.of(turned);
-      if (value > match.log_likelihood) {
-        match.log_likelihood = value;
-        match.code = turned;
-      }
-    }
-    if (match.log_likelihood > best.log_likelihood) {
-      second = best;
-      best = match;
-    } else if (match.log_likelihood > second.log_likelihood) {
-      second = match;
+      const std::uint32_t turned = rotated(codes_[i].code, bits_, k);
+      const std::uint32_t amiss = (turned ^ seen.white) & seen.clear;
+      const int stretches = std::popcount(amiss & ~rotated(amiss, bits_, 1));
+      if (stretches > most_covers || std::popcount(amiss) > bits_ / 2 + 1) continue;
+      matches.push_back({tables.of(turned), i, turned});
     }
   }
+  const auto likelier = [](const Match& a, const Match& b) {
+    return a.log_likelihood != b.log_likelihood ? a.log_likelihood > b.log_likelihood : a.turned < b.turned;
+  };
+  const auto end = matches.begin() + static_cast<std::ptrdiff_t>(std::min(kept, matches.size()));
+  std::partial_sort(matches.begin(), end, matches.end(), likelier);
+  matches.erase(end, matches.end());
+  return matches;
+}
+
+/// The code that explains the ring best, covers allowed, and its lead over the next id.
+DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
+  const std::vector<Match> matches = likeliest(scan);
   DecodedRing ring;
-  ring.id = best.id;
-  ring.code = best.code;
-  const double sigma = std::hypot(black_sigma, white_sigma, scan.noise);
-  const double one_wrong_bit = log_likelihood(0.0, 0.0, sigma) - log_likelihood(1.0, 0.0, sigma);
-  ring.margin = codes_.size() < 2 ? bits_ : (best.log_likelihood - second.log_likelihood) / one_wrong_bit;
+  ring.cost = std::numeric_limits<double>::max();
+  if (matches.empty()) return ring;
+  ring.id = codes_[matches.front().code].id;
+  ring.code = matches.front().turned;
+  if (perfect_likelihood(scan) - matches.front().log_likelihood < hopeless) {
+    const RingEvidence evidence(scan);
+    std::vector<double> best_of_code(codes_.size(), std::numeric_limits<double>::max());
+    std::size_t best_code = 0;
+    for (const Match& match : matches) {
+      const RingExplanation explanation = evidence.explain(match.turned);
+      best_of_code[match.code] = std::min(best_of_code[match.code], explanation.cost);
+      if (explanation.cost >= ring.cost) continue;
+      best_code = match.code;
+      ring.id = codes_[match.code].id;
+      ring.code = match.turned;
+      ring.cost = explanation.cost;
+      ring.covered = explanation.covered;
+    }
+    best_of_code[best_code] = std::numeric_limits<double>::max();
+    ring.margin = *std::min_element(best_of_code.begin(), best_of_code.end()) - ring.cost;
+  }
   compare_bits(scan, ring);
   compare_profile(scan, ring);
   ring.accepted = accepts(ring);
@@ -315,7 +382,7 @@ void RingDecoder::compare_bits(const RingScan& scan, DecodedRing& ring) const {
     }
   }
   ring.distance = ring.wrong + 0.5 * ring.unknown;
-  ring.fit = known > 0 ? std::sqrt(sum / known) : 1.0;
+  ring.fit = known > 0 ? std::sqrt(std::max(0.0, sum / known - scan.noise * scan.noise)) : 1.0;
 }
 
 /// Over the bits that show the code's colour; a column counts as no farther off than half the contrast (dirt).
@@ -342,12 +409,14 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
 }
 
 bool RingDecoder::accepts(const DecodedRing& ring) const {
-  if (ring.unknown > max_unknown_ * bits_ || ring.fit > max_fit || ring.profile > max_profile) return false;
-  const bool corrected_for_sure = 2 * ring.wrong + ring.unknown < min_distance_;
-  constexpr double sure_margin = 1.7;  // in wrong bits: two, less what unevenness takes
-  const bool only_hidden = ring.wrong == 0 && ring.margin >= sure_margin;
-  constexpr double least_margin = 0.7;
-  return (corrected_for_sure && ring.margin >= least_margin) || only_hidden;
+  constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
+  // A ring with something amiss may be another one, covered: then the lead over the next id has to be larger.
+  constexpr double least_margin = 4.2;
+  constexpr double most_margin = 7.0;
+  constexpr double share_of_cost = 0.75;
+  const double margin = std::clamp(share_of_cost * ring.cost, least_margin, most_margin);
+  return ring.cost < most_cost && ring.margin > margin && ring.covered < max_unknown_ && ring.fit < max_fit &&
+         ring.profile < max_profile;
 }
 
 }  // namespace imprint

@@ -40,7 +40,11 @@ bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
   constexpr double small_px = 5.0;
   constexpr double medium_px = 8.0;
   const int transitions = bit_transitions(ring.code, bits);
-  if (minor_axis_px < small_px) return transitions >= 6 && ring.distance == 0.0;
+  constexpr double sure_margin = 8.0;  // nats
+  constexpr double good_cost = 7.0;     // nats
+  if (minor_axis_px < small_px) {
+    return transitions >= 6 && ring.distance == 0.0 && ring.margin > sure_margin && ring.cost < good_cost;
+  }
   if (minor_axis_px < medium_px) return transitions >= 4;
   return true;
 }
@@ -196,7 +200,7 @@ class TargetSearch {
     // A blurred or shaded ring shows fewer white places than it has: half of the fewest is asked for.
     const double least_white_ring = 0.5 * decoder_.least_white() / library_.bits;
     // What is lost in the noise of a level shows on a coarser one, or not at all.
-    constexpr double least_signal_to_noise = 5.0;
+    constexpr double least_signal_to_noise = 3.5;
     DetectConfig of_level = config_;
     of_level.min_contrast = std::max(config_.min_contrast, least_signal_to_noise * look.noise);
     const auto blobs = find_blobs(look.grey.mat(), of_level.min_contrast, config_.max_candidates_per_tile, look.blobs);
@@ -254,10 +258,13 @@ class TargetSearch {
     for (int round = 0; round < rounds; ++round) {
       const auto fine =
           fit_at_full_resolution(dot, [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
-      if (!fine || is_poor(*fine, noise_, is_tiny(dot) ? flaws_before_ring : flaws)) return Rejection::poor_ellipse;
+      if (!fine || is_poor(*fine, noise_at(dot), is_tiny(dot) ? flaws_before_ring : flaws)) return Rejection::poor_ellipse;
+      DecodedDot again = decode(*fine, look);
+      // In a dot of few px blur and size can be taken for each other: a fit that spoils the reading is not believed.
+      if (is_tiny(dot) && (again.rejection != Rejection::none || again.ring.cost > decoded.ring.cost)) break;
+      if (again.rejection != Rejection::none) return again.rejection;
       dot = *fine;
-      decoded = decode(dot, look);
-      if (decoded.rejection != Rejection::none) return decoded.rejection;
+      decoded = std::move(again);
     }
     return Rejection::none;
   }
@@ -324,6 +331,20 @@ class TargetSearch {
     return full;
   }
 
+  /// Standard deviation of the noise about a dot: where it is strong it differs from place to place, since shot noise
+  /// follows the light and black and white cut it off. No more than half above the image's, so that texture does not
+  /// pass for noise.
+  [[nodiscard]] double noise_at(const FittedDot& dot) const {
+    constexpr double strong = 0.1;  // share of the contrast
+    if (noise_ < strong * dot.contrast) return noise_;
+    const double reach = library_.geometry.ring_outer_radius / library_.geometry.dot_radius * axes_of(dot.ellipse).semi_major_px;
+    const Eigen::Vector2d& center = dot.ellipse.center;
+    const cv::Rect2d square(center.x() - reach, center.y() - reach, 2.0 * reach, 2.0 * reach);
+    const cv::Mat& image = pyramid_.level(0).mat();
+    const cv::Rect inside = cv::Rect(square) & cv::Rect(0, 0, image.cols, image.rows);
+    return std::clamp(image_noise(GreyImage(image(inside))), noise_, 1.5 * noise_);
+  }
+
   /// Whether the grey values are farther from a dot's than noise and small flaws make them.
   static constexpr double flaws = 0.12;             // share of the contrast
   static constexpr double flaws_before_ring = 0.2;  // while the ring's light is still in it
@@ -335,7 +356,9 @@ class TargetSearch {
   /// Whether dot and ring together are farther from a target's than either may be alone.
   [[nodiscard]] bool is_doubtful(const FittedDot& dot, const DecodedRing& ring) const {
     constexpr double limit = 0.155;  // share of the contrast
-    const double of_dot = std::sqrt(std::max(0.0, dot.residual * dot.residual - noise_ * noise_)) / dot.contrast;
+    constexpr double known_to = 1.3;  // the noise: it is cut off at black and white, and read off few pixels
+    const double noise = known_to * noise_at(dot);
+    const double of_dot = std::sqrt(std::max(0.0, dot.residual * dot.residual - noise * noise)) / dot.contrast;
     return std::hypot(of_dot, ring.profile) > limit;
   }
 
@@ -355,7 +378,7 @@ class TargetSearch {
     }
     const int l = scan_level(axes_of(dot.ellipse).semi_minor_px);
     const GreyImage image = l < 0 ? GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled) : pyramid_.level(l);
-    return scan_ring(image, l, dot, library_.bits, library_.geometry, noise_, config_.max_unknown);
+    return scan_ring(image, l, dot, library_.bits, library_.geometry, noise_at(dot), config_.max_unknown);
   }
 
   DecodedDot decode(const FittedDot& dot, const Look& look) {

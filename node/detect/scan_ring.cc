@@ -53,12 +53,10 @@ struct BitReading {
   double deviation = 0.0;
 };
 
-BitReading read_bit(const std::vector<double>& columns, std::size_t first) {
+BitReading read_bit(const std::vector<double>& columns, std::size_t first, int left_out = neglected) {
   BitReading reading;
-  constexpr int used = columns_per_bit - 2 * neglected;
-  const auto column = [&](int i) {
-    return columns[(first + neglected + static_cast<std::size_t>(i)) % columns.size()];
-  };
+  const int used = columns_per_bit - 2 * left_out;
+  const auto column = [&](int i) { return columns[(first + static_cast<std::size_t>(left_out + i)) % columns.size()]; };
   for (int i = 0; i < used; ++i) reading.mean += column(i) / used;
   for (int i = 0; i < used; ++i) reading.deviation += std::abs(column(i) - reading.mean) / used;
   return reading;
@@ -66,13 +64,18 @@ BitReading read_bit(const std::vector<double>& columns, std::size_t first) {
 
 /// Column at which a bit begins. A bit's deviation counts up to a limit, so that dirt does not turn the ring.
 std::size_t first_column(const std::vector<double>& columns, int bits, double* deviation) {
+  constexpr double most = 0.3;
   std::size_t best = 0;
   *deviation = std::numeric_limits<double>::max();
   for (std::size_t phase = 0; phase < columns_per_bit; ++phase) {
     double sum = 0.0;
     for (int bit = 0; bit < bits; ++bit) {
-      const double d = read_bit(columns, phase + static_cast<std::size_t>(bit) * columns_per_bit).deviation;
-      sum += std::isnan(d) ? 0.0 : std::min(d, 0.5);
+      const std::size_t begin = phase + static_cast<std::size_t>(bit) * columns_per_bit;
+      const double d = read_bit(columns, begin).deviation;
+      sum += std::isnan(d) ? 0.0 : std::min(d, most);
+      // What is neglected must not be free, or the end of a cover over one bit moves all the others.
+      const double whole = read_bit(columns, begin, 1).deviation;
+      sum += std::isnan(whole) ? 0.0 : 0.5 * std::min(whole, most);
     }
     if (sum / bits < *deviation) {
       *deviation = sum / bits;
@@ -116,6 +119,17 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
   return response;
 }
 
+/// What the scan sees is blurred by its own sampling too: by the pixels of its level and the interpolation between them.
+FittedDot as_scanned(const FittedDot& dot, int level) {
+  const double scale = ImagePyramid::scale(level);
+  constexpr double pixel = 1.0 / 12.0;
+  constexpr double interpolation = 1.0 / 6.0;
+  FittedDot scanned = dot;
+  scanned.blur_px = std::sqrt(dot.blur_px * dot.blur_px + std::max(0.0, scale * scale - 1.0) * pixel +
+                              (level < 0 ? 0.0 : scale * scale * interpolation));
+  return scanned;
+}
+
 }  // namespace
 
 double BitResponse::column_reading(double offset, int before, int bit, int after) const {
@@ -131,6 +145,7 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
   const std::vector<double> columns = scan_columns(image, level, dot, count, geometry);
   const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
   if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
+  const FittedDot scanned = as_scanned(dot, level);
   RingScan scan;
   std::size_t first = first_column(columns, bits, &scan.deviation);
   if (first_column_given) first = static_cast<std::size_t>(*first_column_given % count);
@@ -142,7 +157,7 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
     scan.reading.push_back(read_bit(columns, begin).mean);
     const double angle = two_pi * (static_cast<double>(begin) + 0.5 * columns_per_bit) / count;
     scan.place.push_back(row_radius(geometry, rows / 2) * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-    scan.response.push_back(response_at(dot, bits, geometry, angle));
+    scan.response.push_back(response_at(scanned, bits, geometry, angle));
   }
   set_light(scan, light_slope(dot), 1.0);
   // Pixels that one reading averages: the scanned part of a bit's area, at least one.
@@ -151,8 +166,23 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
   const double outer = row_radius(geometry, rows - 1);
   const double area =
       std::numbers::pi * axes.semi_major_px * axes.semi_minor_px * (outer * outer - inner * inner) / bits * 0.67;
-  scan.noise = noise / dot.contrast / std::sqrt(std::max(1.0, area));
+  // In dots of few px no interpolation knows what lies between the pixels.
+  constexpr double between_pixels = 0.12;  // of the contrast, at a radius of a px, ours
+  scan.noise = std::hypot(noise / dot.contrast / std::sqrt(std::max(1.0, area)),
+                          between_pixels / (axes.semi_minor_px * axes.semi_major_px));
   return scan;
+}
+
+RingScan turned(const RingScan& scan, int columns) {
+  RingScan result = scan;
+  const int count = static_cast<int>(scan.columns.size());
+  const int by = (columns % count + count) % count;
+  std::rotate(result.columns.begin(), result.columns.begin() + by, result.columns.end());
+  result.first_column = (scan.first_column + by) % count;
+  result.first_angle = two_pi * result.first_column / count;
+  for (std::size_t bit = 0; bit < result.reading.size(); ++bit)
+    result.reading[bit] = read_bit(result.columns, bit * columns_per_bit).mean;
+  return result;
 }
 
 void set_blur(RingScan& scan, const FittedDot& dot, const TargetGeometry& geometry) {

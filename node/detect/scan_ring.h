@@ -49,6 +49,9 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
                                   const TargetGeometry& geometry, double noise, double max_unknown,
                                   std::optional<int> first_column = std::nullopt);
 
+/// The scan with its first bit some columns, fewer than a bit has, later.
+RingScan turned(const RingScan& scan, int columns);
+
 /// Has the responses of a scan be those under the blur of `dot`.
 void set_blur(RingScan& scan, const FittedDot& dot, const TargetGeometry& geometry);
 

@@ -109,6 +109,15 @@ struct Outcome {
   std::vector<double> recall_by_step;
 };
 
+void print_wrong(const std::string& what, double value, const Sheet& truth, const std::vector<Claim>& claims) {
+  for (const Claim& claim : claims) {
+    Scores one;
+    one.add(truth.centers, {claim});
+    if (one.wrong() == 0) continue;
+    fmt::print("  {} {:.2f}: id {} claimed at {:.1f}, {:.1f}\n", what, value, claim.id, claim.center.x, claim.center.y);
+  }
+}
+
 Outcome run(const System& system, const DataSet& set, const Sheet& sheet, const Options& options) {
   constexpr int steps = 100;
   Outcome outcome;
@@ -123,6 +132,7 @@ Outcome run(const System& system, const DataSet& set, const Sheet& sheet, const 
     outcome.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     Scores step;
     step.add(harmed.centers, claims);
+    if (options.by_step) print_wrong(system.name + ", " + set.name, value, harmed, claims);
     outcome.all.add(step);
     if (value <= 2.0) outcome.light.add(step);
     outcome.recall_by_step.push_back(step.recall());
