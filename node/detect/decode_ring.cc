@@ -21,7 +21,7 @@ constexpr double cover_probability = 0.05;  // that a bit shows something else, 
 constexpr double cover_density = 0.4;       // of a reading that may be anything from -0.5 to 2
 constexpr double known_limit = 0.35;        // of the bit's contrast: a reading farther off is neither colour
 constexpr double max_profile =
-    0.15;                         // rms of the columns; spots of a texture have no edges where a code has them, ours
+    0.15;  // rms of the columns; spots of a texture have no edges where a code has them, ours
 // Bits that are amiss each for itself, by their likelihood: more, and no cover explains the ring.
 constexpr double hopeless = 32.0;
 constexpr double max_fit = 0.15;  // rms of the known bits; rings in clutter have levels at random
@@ -410,13 +410,16 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
 
 bool RingDecoder::accepts(const DecodedRing& ring) const {
   constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
-  // A ring with something amiss may be another one, covered: then the lead over the next id has to be larger.
-  constexpr double least_margin = 4.2;
-  constexpr double most_margin = 7.0;
-  constexpr double share_of_cost = 0.75;
-  const double margin = std::clamp(share_of_cost * ring.cost, least_margin, most_margin);
-  return ring.cost < most_cost && ring.margin > margin && ring.covered < max_unknown_ && ring.fit < max_fit &&
-         ring.profile < max_profile;
+  if (ring.cost > most_cost || ring.covered > max_unknown_ || ring.fit > max_fit || ring.profile > max_profile)
+    return false;
+  // A ring that is covered in part may be another one, covered elsewhere: the lead over the next id has to be larger.
+  constexpr double least_margin = 3.5;
+  constexpr double margin_of_covered = 6.0;
+  // One bit that shows the wrong colour is nearer to this code than to any other, whatever could be covered.
+  constexpr double margin_of_one_bit = 1.0;
+  if (ring.covered == 0.0) return ring.margin > least_margin;
+  const bool one_bit = ring.wrong == 1 && ring.unknown == 0 && min_distance_ >= 3 && ring.covered * bits_ < 1.4;
+  return ring.margin > (one_bit ? margin_of_one_bit : margin_of_covered);
 }
 
 }  // namespace imprint

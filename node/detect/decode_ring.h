@@ -13,9 +13,9 @@ struct DecodedRing {
   int wrong = 0;          ///< bits that show the other colour
   int unknown = 0;        ///< bits that show neither colour (a cover, dirt, outside the image)
   double distance = 0.0;  ///< wrong + unknown / 2, as [A] equation 14 counts
-  double cost = 0.0;     ///< of the code's explanation of the ring, in nats (`RingExplanation`)
-  double margin = 0.0;   ///< what the best explanation by another id costs more, in nats
-  double covered = 0.0;  ///< share of the ring under covers
+  double cost = 0.0;      ///< of the code's explanation of the ring, in nats (`RingExplanation`)
+  double margin = 0.0;    ///< what the best explanation by another id costs more, in nats
+  double covered = 0.0;   ///< share of the ring under covers
   double fit = 0.0;      ///< rms difference between the readings of known bits and the code's, in shares of their light
   double profile = 0.0;  ///< rms difference of the scan's columns to the code's blurred profile, noise taken out
   std::uint32_t code = 0;  ///< the code at its rotation: bit (bits - 1) is the scan's first

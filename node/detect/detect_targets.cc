@@ -41,9 +41,11 @@ bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
   constexpr double medium_px = 8.0;
   const int transitions = bit_transitions(ring.code, bits);
   constexpr double sure_margin = 8.0;  // nats
-  constexpr double good_cost = 7.0;     // nats
+  constexpr double good_cost = 7.0;    // nats
+  constexpr double good_fit = 0.13;
   if (minor_axis_px < small_px) {
-    return transitions >= 6 && ring.distance == 0.0 && ring.margin > sure_margin && ring.cost < good_cost;
+    return transitions >= 6 && ring.distance == 0.0 && ring.margin > sure_margin && ring.cost < good_cost &&
+           ring.fit < good_fit;
   }
   if (minor_axis_px < medium_px) return transitions >= 4;
   return true;
@@ -258,10 +260,14 @@ class TargetSearch {
     for (int round = 0; round < rounds; ++round) {
       const auto fine =
           fit_at_full_resolution(dot, [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
-      if (!fine || is_poor(*fine, noise_at(dot), is_tiny(dot) ? flaws_before_ring : flaws)) return Rejection::poor_ellipse;
+      if (!fine || is_poor(*fine, noise_at(dot), is_tiny(dot) ? flaws_before_ring : flaws))
+        return Rejection::poor_ellipse;
       DecodedDot again = decode(*fine, look);
       // In a dot of few px blur and size can be taken for each other: a fit that spoils the reading is not believed.
-      if (is_tiny(dot) && (again.rejection != Rejection::none || again.ring.cost > decoded.ring.cost)) break;
+      constexpr double sure_before = 12.0;  // nats
+      if (is_tiny(dot) && decoded.ring.margin > sure_before &&
+          (again.rejection != Rejection::none || again.ring.cost > decoded.ring.cost))
+        break;
       if (again.rejection != Rejection::none) return again.rejection;
       dot = *fine;
       decoded = std::move(again);
@@ -337,7 +343,8 @@ class TargetSearch {
   [[nodiscard]] double noise_at(const FittedDot& dot) const {
     constexpr double strong = 0.1;  // share of the contrast
     if (noise_ < strong * dot.contrast) return noise_;
-    const double reach = library_.geometry.ring_outer_radius / library_.geometry.dot_radius * axes_of(dot.ellipse).semi_major_px;
+    const double reach =
+        library_.geometry.ring_outer_radius / library_.geometry.dot_radius * axes_of(dot.ellipse).semi_major_px;
     const Eigen::Vector2d& center = dot.ellipse.center;
     const cv::Rect2d square(center.x() - reach, center.y() - reach, 2.0 * reach, 2.0 * reach);
     const cv::Mat& image = pyramid_.level(0).mat();
@@ -355,7 +362,7 @@ class TargetSearch {
 
   /// Whether dot and ring together are farther from a target's than either may be alone.
   [[nodiscard]] bool is_doubtful(const FittedDot& dot, const DecodedRing& ring) const {
-    constexpr double limit = 0.155;  // share of the contrast
+    constexpr double limit = 0.155;   // share of the contrast
     constexpr double known_to = 1.3;  // the noise: it is cut off at black and white, and read off few pixels
     const double noise = known_to * noise_at(dot);
     const double of_dot = std::sqrt(std::max(0.0, dot.residual * dot.residual - noise * noise)) / dot.contrast;

@@ -7,7 +7,7 @@
 namespace imprint {
 namespace {
 
-constexpr double black_sigma = 0.06;  // unevenness of the ground, in units of the dot's contrast, ours
+constexpr double black_sigma = 0.08;  // unevenness of the ground, in units of the dot's contrast, ours
 constexpr double white_sigma = 0.12;  // unevenness of paint and light, in shares of a white bit's reading, ours
 constexpr double edge_sigma = 0.04;   // of a bit's border, in bits: what the dot's ellipse leaves open, ours
 constexpr double cover_sigma = 0.10;  // unevenness of a cover, ours

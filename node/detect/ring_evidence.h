@@ -10,9 +10,9 @@ namespace imprint {
 
 /// How well a code explains a scanned ring when things may cover parts of it.
 struct RingExplanation {
-  double cost = 0.0;  ///< negative log likelihood, in nats above that of a ring that shows the code to perfection
-  int covers = 0;     ///< things that hide a stretch of the ring
-  double covered = 0.0;              ///< share of the ring under covers
+  double cost = 0.0;     ///< negative log likelihood, in nats above that of a ring that shows the code to perfection
+  int covers = 0;        ///< things that hide a stretch of the ring
+  double covered = 0.0;  ///< share of the ring under covers
   std::vector<bool> sample_covered;  ///< each sample (`RingEvidence::samples_per_bit` to a bit)
 };
 

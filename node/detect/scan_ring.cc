@@ -119,7 +119,8 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
   return response;
 }
 
-/// What the scan sees is blurred by its own sampling too: by the pixels of its level and the interpolation between them.
+/// What the scan sees is blurred by its own sampling too: by the pixels of its level and the interpolation between
+/// them.
 FittedDot as_scanned(const FittedDot& dot, int level) {
   const double scale = ImagePyramid::scale(level);
   constexpr double pixel = 1.0 / 12.0;
