@@ -88,7 +88,7 @@ class Verifier {
       for (const DetectedTarget& target : view.targets) {
         if (target.id != id) continue;
         const IdealPoint ideal = undistort(view.camera, target.center);
-        sightings.push_back({i, ideal, std::hypot(target.sigma_px, views_[i].sigma_px)});
+        sightings.push_back({i, ideal, std::max(target.sigma_px, views_[i].sigma_px)});
         rays.push_back({views_[i].pose.center_world_mm, views_[i].pose.R_cam_world.transpose() *
                                                             ray_direction_cam(view.camera.focal_length_px, ideal)});
         cameras.push_back(view.camera.id);

@@ -35,8 +35,4 @@ struct DetectionTrace {
 std::vector<DetectedTarget> detect_targets(const cv::Mat& image, const TargetLibrary& library,
                                            const DetectConfig& config, DetectionTrace* trace);
 
-/// The image in colour with the targets (green, with id) and the rejected ellipses (one colour a reason, legend at the
-/// top left) drawn into it.
-cv::Mat draw_detections(const cv::Mat& image, const std::vector<DetectedTarget>& targets, const DetectionTrace& trace);
-
 }  // namespace imprint

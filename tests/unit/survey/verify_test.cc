@@ -88,7 +88,7 @@ TEST_CASE("verify: the 95 % interval of a bar holds its deviation in 85 to 100 %
     widths += check.ci95_mm;
   }
   CHECK(inside >= 34);  // 95 % less three standard deviations of a count of 40
-  // Not by being wide: the noise floor of 0.05 px beside 0.1 px makes them 12 % wider than need be.
+  // Not by being wide: the spread of 40 deviations is known to 11 %, the noise floor adds some.
   CHECK(widths / kRepetitions < 1.5 * 1.96 * std::sqrt(squares / kRepetitions));
 }
 
