@@ -1,7 +1,5 @@
 #!/usr/bin/env python3
-"""./dev bench [stages|accuracy|targets|calibration]: what the node costs and how near the truth the measurement comes.
-"""./dev bench [stages|accuracy|targets|survey]: what the node costs and how near the truth the measurement comes.
-"""./dev bench [stages|accuracy|targets|clutter]: what the node costs and how near the truth the measurement comes.
+"""./dev bench [NAME]: what the node costs and how near the truth the measurement comes.
 
 stages    renders one frame of the forge scene; prints the time of every stage beside cv::Canny, and of the renderer.
 accuracy  renders and measures several seeds of both scenes; prints the errors against the truth.
@@ -83,9 +81,6 @@ def main():
     if options.name in papers:
         bench = BUILD / "tests" / "paper" / papers[options.name] / f"{options.name}_bench"
         sys.exit(subprocess.run([bench], check=False).returncode)
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "targets", "clutter"], help="default: both")
-    if options.name in ("targets", "clutter"):
-        sys.exit(subprocess.run([BUILD / "tests" / "paper" / "targets" / f"{options.name}_bench"], check=False).returncode)
     for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")
