@@ -24,6 +24,8 @@ constexpr double max_profile =
     0.15;  // rms of the columns; spots of a texture have no edges where a code has them, ours
 // Bits that are amiss each for itself, by their likelihood: more, and no cover explains the ring.
 constexpr double hopeless = 32.0;
+constexpr double max_step =
+    0.1;  // bits reach from the ring's inner edge to its outer one, letters and pads do not, ours
 constexpr double max_fit = 0.15;  // rms of the known bits; rings in clutter have levels at random
 
 int bit_of(std::uint32_t code, int bits, int index) {
@@ -50,6 +52,27 @@ double perfect_likelihood(const RingScan& scan) {
 
 double bit_contrast(const RingScan& scan, std::size_t bit) {
   return std::max(scan.response[bit].light * scan.response[bit].own, 0.1);
+}
+
+/// Outer rows less inner rows, over the middle of the bit.
+double mean_step(const RingScan& scan, std::size_t bit) {
+  constexpr int left_out = columns_per_bit / 6;
+  const auto begin = scan.steps.begin() + static_cast<std::ptrdiff_t>(bit * columns_per_bit);
+  return std::accumulate(begin + left_out, begin + columns_per_bit - left_out, 0.0) / (columns_per_bit - 2 * left_out);
+}
+
+/// Whether at least half the bits reach over the whole width of the ring, or leave all of it dark: what covers do not
+/// hide of a ring does, letters and pads do not.
+bool is_even_across(const RingScan& scan) {
+  std::vector<double> steps;
+  for (std::size_t bit = 0; bit < scan.reading.size(); ++bit) {
+    const double step = std::abs(mean_step(scan, bit) - scan.response[bit].step);
+    if (!std::isnan(step)) steps.push_back(step);
+  }
+  if (steps.empty()) return true;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle < std::hypot(max_step, 3.0 * scan.noise);
 }
 
 /// What the code has the bit's reading be; `flipped`: were the bit of the other colour.
@@ -341,7 +364,7 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   if (matches.empty()) return ring;
   ring.id = codes_[matches.front().code].id;
   ring.code = matches.front().turned;
-  if (perfect_likelihood(scan) - matches.front().log_likelihood < hopeless) {
+  if (perfect_likelihood(scan) - matches.front().log_likelihood < hopeless && is_even_across(scan)) {
     const RingEvidence evidence(scan);
     std::vector<double> best_of_code(codes_.size(), std::numeric_limits<double>::max());
     std::size_t best_code = 0;
@@ -388,6 +411,7 @@ void RingDecoder::compare_bits(const RingScan& scan, DecodedRing& ring) const {
 /// Over the bits that show the code's colour; a column counts as no farther off than half the contrast (dirt).
 void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const {
   double sum = 0.0;
+  double steps = 0.0;
   int count = 0;
   for (int i = 0; i < bits_; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -395,6 +419,8 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
     const int own = bit_of(ring.code, bits_, i);
     const int after = bit_of(ring.code, bits_, i + 1);
     if (!is_known(scan, ring.code, i)) continue;
+    const double step = mean_step(scan, at) - scan.response[at].step;
+    if (!std::isnan(step)) steps += step * step / bits_;
     for (int k = 0; k < columns_per_bit; ++k) {
       const double column = scan.columns[at * columns_per_bit + static_cast<std::size_t>(k)];
       if (std::isnan(column)) continue;
@@ -404,13 +430,16 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
       ++count;
     }
   }
+  // A step's variance is four times a reading's; of fifteen squares twice the mean is rarely passed.
+  ring.step = std::sqrt(std::max(0.0, steps - 12.0 * scan.noise * scan.noise));
   const double column_noise = scan.noise * std::sqrt(static_cast<double>(columns_per_bit));
   ring.profile = count == 0 ? 1.0 : std::sqrt(std::max(0.0, sum / count - std::min(0.15, column_noise * column_noise)));
 }
 
 bool RingDecoder::accepts(const DecodedRing& ring) const {
   constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
-  if (ring.cost > most_cost || ring.covered > max_unknown_ || ring.fit > max_fit || ring.profile > max_profile)
+  if (ring.cost > most_cost || ring.covered > max_unknown_ || ring.fit > max_fit || ring.profile > max_profile ||
+      ring.step > max_step)
     return false;
   // A ring that is covered in part may be another one, covered elsewhere: the lead over the next id has to be larger.
   constexpr double least_margin = 3.5;

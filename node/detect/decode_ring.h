@@ -18,6 +18,7 @@ struct DecodedRing {
   double covered = 0.0;   ///< share of the ring under covers
   double fit = 0.0;      ///< rms difference between the readings of known bits and the code's, in shares of their light
   double profile = 0.0;  ///< rms difference of the scan's columns to the code's blurred profile, noise taken out
+  double step = 0.0;     ///< rms of the steps between inner and outer half of known bits, noise taken out
   std::uint32_t code = 0;  ///< the code at its rotation: bit (bits - 1) is the scan's first
   bool accepted = false;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
 namespace imprint {
 namespace {
@@ -33,10 +34,10 @@ RingEvidence::RingEvidence(const RingScan& scan)
       samples_(bits_ * samples_per_bit),
       columns_(scan.columns),
       expected_(static_cast<std::size_t>(samples_)),
-      clear_(static_cast<std::size_t>(samples_)) {
+      clear_(static_cast<std::size_t>(samples_)),
+      cover_(static_cast<std::size_t>(samples_)) {
   constexpr double columns_of_reading = 16.0;  // the scan's noise is of a mean of so many
   noise_variance_ = scan.noise * scan.noise * columns_of_reading / columns_per_sample;
-  for (auto& costs : cover_) costs.resize(static_cast<std::size_t>(samples_));
   for (int i = 0; i < samples_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const BitResponse& response = scan.response[at / samples_per_bit];
@@ -73,50 +74,67 @@ void RingEvidence::turn(int columns) {
       const double off = reading - (lowest_grey + static_cast<double>(g) * grey_step);
       const double surprise =
           0.5 * (off * off - noise_variance_) / (correlated * cover_sigma * cover_sigma + noise_variance_);
-      cover_[g][at] = cost_of_bit / samples_per_bit + (outside ? 0.0 : surprise);
+      cover_[at][g] = static_cast<float>(cost_of_bit / samples_per_bit + (outside ? 0.0 : surprise));
     }
-    cover_[greys][at] = (cost_of_bit + cost_of_unevenness * independent_per_bit) / samples_per_bit;
+    cover_[at][greys] = static_cast<float>((cost_of_bit + cost_of_unevenness * independent_per_bit) / samples_per_bit);
+    for (std::size_t g = greys + 1; g < groups * lanes; ++g) cover_[at][g] = 1e6F;  // no level
   }
 }
 
-RingEvidence::Stretch RingEvidence::best_cover(const std::vector<double>& clear) const {
-  Stretch best;
-  for (std::size_t g = 0; g < cover_.size(); ++g) {
-    const double begin = cost_of_cover + (g < greys ? cost_of_grey : 0.0);
+RingEvidence::Stretch RingEvidence::best_cover(const std::vector<float>& clear) const {
+  // Reading a ring takes longest for this: four grey levels at once in the lanes of a vector register.
+  using Lanes = float __attribute__((vector_size(lanes * sizeof(float))));
+  using Places = std::int32_t __attribute__((vector_size(lanes * sizeof(std::int32_t))));
+  Stretch likeliest;
+  for (std::size_t group = 0; group < groups; ++group) {
     // The stretch of the circle with the largest sum, from all that end at a sample the best.
-    Stretch running;
-    for (int i = 0; i < 2 * samples_; ++i) {
-      const auto at = static_cast<std::size_t>(i % samples_);
-      if (running.gain <= 0.0 || running.length >= samples_) running = {0.0, i, 0};
-      running.gain += clear[at] - cover_[g][at];
-      ++running.length;
-      if (running.gain - begin > best.gain) best = {running.gain - begin, running.first % samples_, running.length};
+    Lanes running{};
+    Lanes best{};
+    Places first{};
+    Places best_first{};
+    Places best_length{};
+    for (std::int32_t i = 0; i < 2 * samples_; ++i) {
+      const auto at = static_cast<std::size_t>(i < samples_ ? i : i - samples_);
+      Lanes cover;
+      std::memcpy(&cover, &cover_[at][group * lanes], sizeof(cover));
+      const Places anew = (running <= 0.0F) | (i - first >= samples_);
+      first = anew ? Places{} + i : first;
+      running = (anew ? Lanes{} : running) + (clear[at] - cover);
+      const Places better = running > best;
+      best = better ? running : best;
+      best_first = better ? first : best_first;
+      best_length = better ? i - first + 1 : best_length;
+    }
+    for (std::size_t k = 0; k < lanes && group * lanes + k <= greys; ++k) {
+      const float gain = best[k] - static_cast<float>(cost_of_cover + (group * lanes + k < greys ? cost_of_grey : 0.0));
+      if (gain > likeliest.gain) likeliest = {gain, best_first[k] % samples_, best_length[k]};
     }
   }
-  return best;
+  return likeliest;
 }
 
 RingExplanation RingEvidence::explain(std::uint32_t code) const {
   RingExplanation explanation;
-  std::vector<double> clear(static_cast<std::size_t>(samples_));
+  std::vector<float> clear(static_cast<std::size_t>(samples_));
   for (int i = 0; i < samples_; ++i) {
     // Colours of three neighbours, the ring closed.
     const int bit = i / samples_per_bit;
     const auto colour = [&](int b) { return (code >> static_cast<unsigned>(bits_ - 1 - (b + bits_) % bits_)) & 1U; };
     const unsigned colours = colour(bit - 1) << 2U | colour(bit) << 1U | colour(bit + 1);
-    clear[static_cast<std::size_t>(i)] = clear_[static_cast<std::size_t>(i)][colours];
-    explanation.cost += clear[static_cast<std::size_t>(i)];
+    const double cost = clear_[static_cast<std::size_t>(i)][colours];
+    clear[static_cast<std::size_t>(i)] = static_cast<float>(cost);
+    explanation.cost += cost;
   }
   explanation.sample_covered.assign(static_cast<std::size_t>(samples_), false);
   int covered = 0;
   while (explanation.covers < most_covers && explanation.cost > cost_of_cover) {
     const Stretch cover = best_cover(clear);
-    if (cover.gain <= 0.0) break;
+    if (cover.gain <= 0.0F) break;
     explanation.cost -= cover.gain;
     ++explanation.covers;
     for (int k = 0; k < cover.length; ++k) {
       const auto at = static_cast<std::size_t>((cover.first + k) % samples_);
-      clear[at] = 0.0;
+      clear[at] = 0.0F;
       if (!explanation.sample_covered[at]) ++covered;
       explanation.sample_covered[at] = true;
     }

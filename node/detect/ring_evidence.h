@@ -35,13 +35,15 @@ class RingEvidence {
 
  private:
   static constexpr int greys = 12;
+  static constexpr std::size_t lanes = 4;
+  static constexpr std::size_t groups = 4;  // of lanes: they hold all grey levels, and one for any
 
   struct Stretch {
-    double gain = 0.0;
+    float gain = 0.0F;
     int first = 0;
     int length = 0;
   };
-  [[nodiscard]] Stretch best_cover(const std::vector<double>& clear) const;
+  [[nodiscard]] Stretch best_cover(const std::vector<float>& clear) const;
 
   struct Expected {
     double reading = 0.0;
@@ -53,7 +55,7 @@ class RingEvidence {
   std::vector<double> columns_;
   std::vector<std::array<Expected, 8>> expected_;  // by sample and the colours of the bit before, the own and the next
   std::vector<std::array<double, 8>> clear_;       // the same
-  std::array<std::vector<double>, greys + 1> cover_;  // by grey level (the last: any) and sample
+  std::vector<std::array<float, groups * lanes>> cover_;  // by sample and grey level (the one after the last: any)
 };
 
 }  // namespace imprint

@@ -24,28 +24,35 @@ double row_radius(const TargetGeometry& geometry, int row) {
          geometry.dot_radius;
 }
 
-/// Mean reading of each column; NaN where the ring leaves the image.
-std::vector<double> scan_columns(const GreyImage& level, int l, const FittedDot& dot, int columns,
-                                 const TargetGeometry& geometry) {
+struct Columns {
+  std::vector<double> means;  // NaN where the ring leaves the image
+  std::vector<double> steps;  // outer rows less inner rows; NaN where the outer ones leave the image
+};
+
+Columns scan_columns(const GreyImage& level, int l, const FittedDot& dot, int columns, const TargetGeometry& geometry) {
   const Eigen::Vector2d center = ImagePyramid::to_level(dot.ellipse.center, l);
   const Eigen::Matrix2d frame = frame_of(dot.ellipse) / ImagePyramid::scale(l);
-  std::vector<double> readings(static_cast<std::size_t>(columns));
+  Columns scanned;
   for (int i = 0; i < columns; ++i) {
     const double angle = two_pi * (i + 0.5) / columns;
     const Eigen::Vector2d direction = frame * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     double sum = 0.0;
+    double step = 0.0;
     int inside = 0;
     for (int row = 0; row < rows; ++row) {
       const Eigen::Vector2d p = center + row_radius(geometry, row) * direction;
       if (!level.contains(p)) continue;
-      sum += level.at(p);
+      const double grey = level.at(p);
+      sum += grey;
+      if (row != rows / 2) step += row > rows / 2 ? grey : -grey;
       ++inside;
     }
     // At the border of the image the inner rows may still tell.
-    readings[static_cast<std::size_t>(i)] =
-        inside == 0 ? std::numeric_limits<double>::quiet_NaN() : (sum / inside - dot.black) / dot.contrast;
+    constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+    scanned.means.push_back(inside == 0 ? nowhere : (sum / inside - dot.black) / dot.contrast);
+    scanned.steps.push_back(inside < rows ? nowhere : step / (rows / 2) / dot.contrast);
   }
-  return readings;
+  return scanned;
 }
 
 struct BitReading {
@@ -102,7 +109,9 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
   for (int row = 0; row < rows; ++row) {
     const double r = row_radius(geometry, row);
     response.radial += (normal_cdf((outer - r) / radial_sigma) - normal_cdf((inner - r) / radial_sigma)) / rows;
-    response.floor += normal_cdf((1.0 - r) / radial_sigma) / rows;
+    const double from_dot = normal_cdf((1.0 - r) / radial_sigma);
+    response.floor += from_dot / rows;
+    if (row != rows / 2) response.step += (row > rows / 2 ? from_dot : -from_dot) / (rows / 2);
   }
   response.own = 0.0;
   response.angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;
@@ -143,7 +152,8 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
                                   const TargetGeometry& geometry, double noise, double max_unknown,
                                   std::optional<int> first_column_given) {
   const int count = bits * columns_per_bit;
-  const std::vector<double> columns = scan_columns(image, level, dot, count, geometry);
+  const Columns seen = scan_columns(image, level, dot, count, geometry);
+  const std::vector<double>& columns = seen.means;
   const auto outside = std::count_if(columns.begin(), columns.end(), [](double v) { return std::isnan(v); });
   if (static_cast<double>(outside) > max_unknown * count) return std::nullopt;
   const FittedDot scanned = as_scanned(dot, level);
@@ -151,7 +161,10 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
   std::size_t first = first_column(columns, bits, &scan.deviation);
   if (first_column_given) first = static_cast<std::size_t>(*first_column_given % count);
   scan.first_column = static_cast<int>(first);
-  for (std::size_t i = 0; i < columns.size(); ++i) scan.columns.push_back(columns[(first + i) % columns.size()]);
+  scan.columns = seen.means;
+  scan.steps = seen.steps;
+  for (auto* row : {&scan.columns, &scan.steps})
+    std::rotate(row->begin(), row->begin() + static_cast<std::ptrdiff_t>(first), row->end());
   scan.first_angle = two_pi * static_cast<double>(first) / count;
   for (int bit = 0; bit < bits; ++bit) {
     const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
@@ -178,7 +191,7 @@ RingScan turned(const RingScan& scan, int columns) {
   RingScan result = scan;
   const int count = static_cast<int>(scan.columns.size());
   const int by = (columns % count + count) % count;
-  std::rotate(result.columns.begin(), result.columns.begin() + by, result.columns.end());
+  for (auto* row : {&result.columns, &result.steps}) std::rotate(row->begin(), row->begin() + by, row->end());
   result.first_column = (scan.first_column + by) % count;
   result.first_angle = two_pi * result.first_column / count;
   for (std::size_t bit = 0; bit < result.reading.size(); ++bit)

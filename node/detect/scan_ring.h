@@ -17,6 +17,7 @@ struct BitResponse {
   double beside = 0.0;         ///< share of each of the two next bits
   double radial = 1.0;         ///< share of a white arc's light that the scanned rows see
   double angular_sigma = 0.0;  ///< blur along the ring, in bits
+  double step = 0.0;           ///< light of the dot on the outer rows less that on the inner ones
   double light = 1.0;          ///< light at the bit in units of that at the dot's centre
 
   [[nodiscard]] double reading(int before, int bit, int after) const {
@@ -37,6 +38,7 @@ struct RingScan {
   double first_angle = 0.0;            ///< where the first bit begins, in the frame of the dot
   double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
   std::vector<double> columns;         ///< mean reading of each column from the first bit's beginning on
+  std::vector<double> steps;           ///< by how much each column is brighter in its outer rows than in its inner ones
   double deviation = 0.0;              ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
 };
 
