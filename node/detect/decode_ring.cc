@@ -297,6 +297,7 @@ RingDecoder::Correlated RingDecoder::correlate(const RingScan& scan) const {
   ring.fit = std::sqrt(left / 4.0);  // about the rms in bits' light: half the bits are white
   ring.profile = ring.fit;
   ring.margin = (1.0 - second * second - left) / least_advantage;
+  ring.lead = std::numeric_limits<double>::infinity();  // its margin is not in nats
   ring.accepted = left < most_left && ring.margin > 1.0 && result.light > least_light && result.light < most_light;
   return result;
 }
@@ -308,6 +309,7 @@ DecodedRing RingDecoder::decode_plainly(const RingScan& scan) const {
   const auto known = std::find_if(codes_.begin(), codes_.end(), [&](const TargetCode& code) {
     return smallest_rotation(code.code, bits_) == smallest_rotation(ring.code, bits_);
   });
+  ring.lead = std::numeric_limits<double>::infinity();
   ring.accepted = known != codes_.end();
   if (ring.accepted) ring.id = known->id;
   return ring;
@@ -383,7 +385,10 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   }
   compare_bits(scan, ring);
   compare_profile(scan, ring);
-  ring.accepted = accepts(ring);
+  ring.lead = ring.margin - least_margin(ring);
+  constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
+  ring.accepted = ring.lead > 0.0 && ring.cost < most_cost && ring.covered < max_unknown_ && ring.fit < max_fit &&
+                  ring.profile < max_profile && ring.step < max_step;
   return ring;
 }
 
@@ -436,19 +441,15 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
   ring.profile = count == 0 ? 1.0 : std::sqrt(std::max(0.0, sum / count - std::min(0.15, column_noise * column_noise)));
 }
 
-bool RingDecoder::accepts(const DecodedRing& ring) const {
-  constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
-  if (ring.cost > most_cost || ring.covered > max_unknown_ || ring.fit > max_fit || ring.profile > max_profile ||
-      ring.step > max_step)
-    return false;
+double RingDecoder::least_margin(const DecodedRing& ring) const {
+  constexpr double of_uncovered = 3.5;
   // A ring that is covered in part may be another one, covered elsewhere: the lead over the next id has to be larger.
-  constexpr double least_margin = 3.5;
-  constexpr double margin_of_covered = 6.0;
+  constexpr double of_covered = 6.0;
   // One bit that shows the wrong colour is nearer to this code than to any other, whatever could be covered.
-  constexpr double margin_of_one_bit = 1.0;
-  if (ring.covered == 0.0) return ring.margin > least_margin;
+  constexpr double of_one_bit = 1.0;
+  if (ring.covered == 0.0) return of_uncovered;
   const bool one_bit = ring.wrong == 1 && ring.unknown == 0 && min_distance_ >= 3 && ring.covered * bits_ < 1.4;
-  return ring.margin > (one_bit ? margin_of_one_bit : margin_of_covered);
+  return one_bit ? of_one_bit : of_covered;
 }
 
 }  // namespace imprint

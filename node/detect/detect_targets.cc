@@ -42,10 +42,13 @@ bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
   const int transitions = bit_transitions(ring.code, bits);
   constexpr double sure_margin = 8.0;  // nats
   constexpr double good_cost = 7.0;    // nats
-  constexpr double good_fit = 0.13;
+  constexpr double most_fit = 0.13;
+  // The smaller a dot, the less of a reading is its own: it fits worse, or is beyond doubt.
+  constexpr double fit_of_one_px = 0.28;
+  constexpr double margin_beyond_doubt = 18.0;  // nats
   if (minor_axis_px < small_px) {
     return transitions >= 6 && ring.distance == 0.0 && ring.margin > sure_margin && ring.cost < good_cost &&
-           ring.fit < good_fit;
+           ring.fit < most_fit && (ring.fit * minor_axis_px < fit_of_one_px || ring.margin > margin_beyond_doubt);
   }
   if (minor_axis_px < medium_px) return transitions >= 4;
   return true;
@@ -97,7 +100,7 @@ class ExaminedPlaces {
 struct Found {
   DetectedTarget target;
   Ellipse ellipse;
-  double margin = 0.0;
+  double lead = 0.0;
   double fit = 0.0;
 };
 
@@ -122,8 +125,10 @@ class TargetSearch {
       if (is_known(candidate.full) || examined_.has_like(candidate.full, look.rank())) continue;
       examined_.add(candidate.full, look.rank());
       const Rejection rejection = examine(look, candidate.star);
+      if (rejection == Rejection::no_code) ++unread_;
       if (rejection != Rejection::none) reject(candidate.full, rejection);
     }
+    drop_unlikely();
     return each_id_once();
   }
 
@@ -248,7 +253,7 @@ class TargetSearch {
                                 dot.sigma_px,
                                 diameter_of(dot.ellipse),
                                 decoded.ring.distance};
-    found_.push_back({target, dot.ellipse, decoded.ring.margin, decoded.ring.fit});
+    found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit});
     return Rejection::none;
   }
 
@@ -430,6 +435,20 @@ class TargetSearch {
     return a.fit / a.target.dot_diameter_px < b.fit / b.target.dot_diameter_px;
   }
 
+  /// Where many rings are read in vain some read as a code by chance: the fewer targets there are to so many rings, the
+  /// larger the lead that each must have.
+  void drop_unlikely() {
+    constexpr double expected_to_target = 10.0;
+    constexpr double few_targets = 5.0;
+    const double odds = unread_ / (expected_to_target * (static_cast<double>(found_.size()) + few_targets));
+    const double least_lead = std::log(std::max(1.0, odds));
+    std::erase_if(found_, [&](const Found& f) {
+      if (f.lead >= least_lead) return false;
+      reject(f.ellipse, Rejection::no_code);
+      return true;
+    });
+  }
+
   /// Of two targets that claim one id the one with fewer bits amiss stays; when neither is better, both go: a wrong id
   /// costs more than a missing one.
   std::vector<DetectedTarget> each_id_once() {
@@ -462,6 +481,7 @@ class TargetSearch {
   double noise_;
   DetectionTrace* trace_;
   std::vector<Found> found_;
+  int unread_ = 0;  // rings that are none of the library
 };
 
 }  // namespace
