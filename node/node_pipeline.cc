@@ -64,6 +64,13 @@ Result<void> take_pose(const Frame& frame, bool forging_in_view, PoseKeeper* kee
   return {};
 }
 
+// A target smaller than this hardly helps a pose, and looking for it takes a look at the image doubled.
+DetectConfig of_rig_targets() {
+  DetectConfig config;
+  config.min_dot_px = 4.0;
+  return config;
+}
+
 // Again, with less trust in targets beside the forging; the first pose has served to find it.
 Result<Resection> resect_in_hot_air(const CameraModel& camera, const Rig& rig, Result<Resection> first,
                                     const std::vector<DetectedTarget>& targets, const Segmentation& forging) {
@@ -98,7 +105,7 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
   imprint.method = edge_method_name(method);
   if (auto size = check_size(frame, camera); !size) return give_up(result, size.error());
 
-  result.targets = timed(result, "detect", [&] { return detect_targets(frame.image, rig.library, DetectConfig{}); });
+  result.targets = timed(result, "detect", [&] { return detect_targets(frame.image, rig.library, of_rig_targets()); });
   imprint.quality.targets_seen = static_cast<int>(result.targets.size());
 
   auto resection = timed(result, "resect", [&] { return resect(camera, result.targets, rig.field, ResectConfig{}); });

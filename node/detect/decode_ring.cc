@@ -385,10 +385,10 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   }
   compare_bits(scan, ring);
   compare_profile(scan, ring);
-  ring.lead = ring.margin - least_margin(ring);
   constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
-  ring.accepted = ring.lead > 0.0 && ring.cost < most_cost && ring.covered < max_unknown_ && ring.fit < max_fit &&
-                  ring.profile < max_profile && ring.step < max_step;
+  ring.lead = std::min(ring.margin - least_margin(ring), most_cost - ring.cost);
+  ring.accepted = ring.lead > 0.0 && ring.covered < max_unknown_ && ring.fit < max_fit && ring.profile < max_profile &&
+                  ring.step < max_step;
   return ring;
 }
 

@@ -15,7 +15,7 @@ struct DecodedRing {
   double distance = 0.0;  ///< wrong + unknown / 2, as [A] equation 14 counts
   double cost = 0.0;      ///< of the code's explanation of the ring, in nats (`RingExplanation`)
   double margin = 0.0;    ///< what the best explanation by another id costs more, in nats
-  double lead = 0.0;      ///< by how much the margin is larger than is asked of such a ring, in nats
+  double lead = 0.0;      ///< by how much margin and cost are better than is asked of such a ring, in nats
   double covered = 0.0;   ///< share of the ring under covers
   double fit = 0.0;      ///< rms difference between the readings of known bits and the code's, in shares of their light
   double profile = 0.0;  ///< rms difference of the scan's columns to the code's blurred profile, noise taken out

@@ -187,7 +187,7 @@ class TargetSearch {
     const double noise = std::max(rounding, noise_) / ImagePyramid::scale(l);
     const cv::Mat& level = pyramid_.level(l).mat();
     // Sharp images have 0.3 here; the estimate grows more slowly than the blur where there are no long edges.
-    constexpr double blurred_px = 0.5;
+    constexpr double blurred_px = 0.6;
     if (edge_blur_px(level, noise) < blurred_px) return;
     for (const double removed : {1.0, 1.5, 1.9}) {
       double lowest = 0.0;

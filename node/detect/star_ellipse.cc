@@ -83,6 +83,8 @@ bool has_allowed_axes(const Ellipse& ellipse, const DetectConfig& config) {
 struct FirstRays {
   EdgePoints edge;  // px from the start
   double mean_px = 0.0;
+  double shortest_px = std::numeric_limits<double>::max();
+  double longest_px = 0.0;
   double lowest = 0.0;  // of the grey levels seen
 };
 
@@ -99,9 +101,13 @@ std::optional<FirstRays> cast_first_rays(const GreyImage& level, const Eigen::Ve
     if (r > 0.0) {
       first.edge.add(r * directions.unit[ray]);
       first.mean_px += r;
+      first.shortest_px = std::min(first.shortest_px, r);
+      first.longest_px = std::max(first.longest_px, r);
     } else if (i + 1 - static_cast<int>(first.edge.count) > max_failed_rays / 2) {
       return std::nullopt;
     }
+    // Some ray must be as short as the minor axis allows, wherever in the ellipse it starts.
+    if (i + 1 == rough_rays / 2 && first.shortest_px > 1.3 * max_level_semi_minor_px) return std::nullopt;
   }
   first.mean_px /= static_cast<double>(first.edge.count);
   return first;
@@ -297,7 +303,9 @@ std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen
   const auto first = cast_first_rays(level, start, top, config.min_contrast);
   if (!first) return std::nullopt;
   if (auto star = refine(level, ellipse_through(*first, start), config)) return star;
-  // From the end of a long dot rays see little of it.
+  // From the end of a long dot rays see little of it: some of them pass along it.
+  constexpr double long_dot = 2.5;
+  if (first->longest_px < long_dot * first->shortest_px) return std::nullopt;
   const double half = 0.5 * (top + first->lowest);
   return refine(level, ellipse_of_spot(level, start, half, config.max_axis_ratio), config);
 }
