@@ -210,7 +210,9 @@ class TargetSearch {
     constexpr double least_signal_to_noise = 3.5;
     DetectConfig of_level = config_;
     of_level.min_contrast = std::max(config_.min_contrast, least_signal_to_noise * look.noise);
-    const auto blobs = find_blobs(look.grey.mat(), of_level.min_contrast, config_.max_candidates_per_tile, look.blobs);
+    // Where all dots are tiny, those that are not targets' have to be many to hide one.
+    const int per_tile = look.level < 0 ? config_.max_candidates_per_tile / 2 : config_.max_candidates_per_tile;
+    const auto blobs = find_blobs(look.grey.mat(), of_level.min_contrast, per_tile, look.blobs);
     for (const cv::Point& blob : blobs) {
       const Eigen::Vector2d start =
           look.level < 0 ? ImagePyramid::to_level({blob.x, blob.y}, look.level) : Eigen::Vector2d(blob.x, blob.y);

@@ -8,26 +8,45 @@
 
 namespace imprint {
 
-double GreyImage::cubic(const Eigen::Vector2d& p) const {
+namespace {
+
+/// Catmull-Rom: through the pixels, exact for slopes and curvature.
+std::array<double, 4> cubic_weights(double t) {
+  return {((2.0 - t) * t - 1.0) * t / 2.0, ((3.0 * t - 5.0) * t * t + 2.0) / 2.0, ((4.0 - 3.0 * t) * t + 1.0) * t / 2.0,
+          (t - 1.0) * t * t / 2.0};
+}
+
+template <class Pixel>
+double cubic_of(const cv::Mat& image, const Eigen::Vector2d& p) {
   const int x = static_cast<int>(std::floor(p.x()));
   const int y = static_cast<int>(std::floor(p.y()));
-  // Catmull-Rom: through the pixels, exact for slopes and curvature.
-  const auto weights = [](double t) {
-    return std::array{((2.0 - t) * t - 1.0) * t / 2.0, ((3.0 * t - 5.0) * t * t + 2.0) / 2.0,
-                      ((4.0 - 3.0 * t) * t + 1.0) * t / 2.0, (t - 1.0) * t * t / 2.0};
-  };
-  const auto u = weights(p.x() - x);
-  const auto v = weights(p.y() - y);
+  const auto u = cubic_weights(p.x() - x);
+  const auto v = cubic_weights(p.y() - y);
+  const bool inside = x >= 1 && x + 2 < image.cols;
   double sum = 0.0;
   for (int j = 0; j < 4; ++j) {
-    const int row = std::clamp(y - 1 + j, 0, image_.rows - 1);
+    const Pixel* row = image.ptr<Pixel>(std::clamp(y - 1 + j, 0, image.rows - 1));
     double along = 0.0;
     for (int i = 0; i < 4; ++i) {
-      along += u[static_cast<std::size_t>(i)] * stored(std::clamp(x - 1 + i, 0, image_.cols - 1), row);
+      const int column = inside ? x - 1 + i : std::clamp(x - 1 + i, 0, image.cols - 1);
+      along += u[static_cast<std::size_t>(i)] * static_cast<double>(row[column]);
     }
     sum += v[static_cast<std::size_t>(j)] * along;
   }
   return sum;
+}
+
+}  // namespace
+
+double GreyImage::cubic(const Eigen::Vector2d& p) const {
+  switch (depth_) {
+    case CV_16U:
+      return cubic_of<std::uint16_t>(image_, p);
+    case CV_32F:
+      return cubic_of<float>(image_, p);
+    default:
+      return cubic_of<std::uint8_t>(image_, p);
+  }
 }
 
 ImagePyramid::ImagePyramid(const cv::Mat& image, int levels) {

@@ -305,7 +305,8 @@ std::optional<StarEllipse> find_star_ellipse(const GreyImage& level, const Eigen
   if (auto star = refine(level, ellipse_through(*first, start), config)) return star;
   // From the end of a long dot rays see little of it: some of them pass along it.
   constexpr double long_dot = 2.5;
-  if (first->longest_px < long_dot * first->shortest_px) return std::nullopt;
+  constexpr double seen_by_rays = 6.0;
+  if (config.max_axis_ratio <= seen_by_rays || first->longest_px < long_dot * first->shortest_px) return std::nullopt;
   const double half = 0.5 * (top + first->lowest);
   return refine(level, ellipse_of_spot(level, start, half, config.max_axis_ratio), config);
 }
