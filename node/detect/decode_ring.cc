@@ -424,7 +424,7 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
     const int own = bit_of(ring.code, bits_, i);
     const int after = bit_of(ring.code, bits_, i + 1);
     if (!is_known(scan, ring.code, i)) continue;
-    const double step = mean_step(scan, at) - scan.response[at].step;
+    const double step = (mean_step(scan, at) - scan.response[at].step) / std::max(1.0, scan.response[at].light);
     if (!std::isnan(step)) steps += step * step / bits_;
     for (int k = 0; k < columns_per_bit; ++k) {
       const double column = scan.columns[at * columns_per_bit + static_cast<std::size_t>(k)];
