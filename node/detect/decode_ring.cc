@@ -54,11 +54,18 @@ double bit_contrast(const RingScan& scan, std::size_t bit) {
   return std::max(scan.response[bit].light * scan.response[bit].own, 0.1);
 }
 
-/// Outer rows less inner rows, over the middle of the bit.
-double mean_step(const RingScan& scan, std::size_t bit) {
+/// Outer rows less inner rows, over the middle of the bit, besides what the dot lends them, by the bit's own light.
+/// Where blur takes much of the ring's width, as in a ring seen from its edge, the step counts less.
+double unexpected_step(const RingScan& scan, std::size_t bit) {
   constexpr int left_out = columns_per_bit / 6;
   const auto begin = scan.steps.begin() + static_cast<std::ptrdiff_t>(bit * columns_per_bit);
-  return std::accumulate(begin + left_out, begin + columns_per_bit - left_out, 0.0) / (columns_per_bit - 2 * left_out);
+  const double step =
+      std::accumulate(begin + left_out, begin + columns_per_bit - left_out, 0.0) / (columns_per_bit - 2 * left_out);
+  const BitResponse& response = scan.response[bit];
+  constexpr double blurred = 0.6;  // share of a white bit's light on the scanned rows
+  constexpr double sharp = 0.9;
+  const double weight = std::clamp((response.radial - blurred) / (sharp - blurred), 0.0, 1.0);
+  return weight * (step - response.step) / std::max(1.0, response.light);
 }
 
 /// Whether at least half the bits reach over the whole width of the ring, or leave all of it dark: what covers do not
@@ -66,7 +73,7 @@ double mean_step(const RingScan& scan, std::size_t bit) {
 bool is_even_across(const RingScan& scan) {
   std::vector<double> steps;
   for (std::size_t bit = 0; bit < scan.reading.size(); ++bit) {
-    const double step = std::abs(mean_step(scan, bit) - scan.response[bit].step);
+    const double step = std::abs(unexpected_step(scan, bit));
     if (!std::isnan(step)) steps.push_back(step);
   }
   if (steps.empty()) return true;
@@ -424,7 +431,7 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
     const int own = bit_of(ring.code, bits_, i);
     const int after = bit_of(ring.code, bits_, i + 1);
     if (!is_known(scan, ring.code, i)) continue;
-    const double step = (mean_step(scan, at) - scan.response[at].step) / std::max(1.0, scan.response[at].light);
+    const double step = unexpected_step(scan, at);
     if (!std::isnan(step)) steps += step * step / bits_;
     for (int k = 0; k < columns_per_bit; ++k) {
       const double column = scan.columns[at * columns_per_bit + static_cast<std::size_t>(k)];

@@ -35,23 +35,27 @@ double diameter_of(const Ellipse& ellipse) {
 constexpr double max_sigma_of_diameter = 0.04;
 
 /// Spots of a texture stand beside each other like a small dot and a ring of few arcs: from a dot of few px only a
-/// ring with many changes of colour, all of them right, is taken for a code.
-bool is_telling(const DecodedRing& ring, double minor_axis_px, int bits) {
+/// ring with many changes of colour, all of them right, is taken for a code. The ring's lead, or less: negative when
+/// the ring does not tell enough.
+double lead_by_size(const DecodedRing& ring, double minor_axis_px, int bits) {
   constexpr double small_px = 5.0;
   constexpr double medium_px = 8.0;
+  constexpr double too_little = -1.0;
   const int transitions = bit_transitions(ring.code, bits);
+  if (minor_axis_px >= medium_px) return ring.lead;
+  if (minor_axis_px >= small_px) return transitions >= 4 ? ring.lead : too_little;
   constexpr double sure_margin = 8.0;  // nats
   constexpr double good_cost = 7.0;    // nats
-  constexpr double most_fit = 0.13;
-  // The smaller a dot, the less of a reading is its own: it fits worse, or is beyond doubt.
+  if (transitions < 6 || ring.distance > 0.0 || ring.margin < sure_margin || ring.cost > good_cost) return too_little;
+  // The smaller a dot, the less of a reading is its own: it fits worse, or is beyond doubt. What is doubtful is
+  // believed among other targets only.
+  constexpr double good_fit = 0.13;
   constexpr double fit_of_one_px = 0.28;
   constexpr double margin_beyond_doubt = 18.0;  // nats
-  if (minor_axis_px < small_px) {
-    return transitions >= 6 && ring.distance == 0.0 && ring.margin > sure_margin && ring.cost < good_cost &&
-           ring.fit < most_fit && (ring.fit * minor_axis_px < fit_of_one_px || ring.margin > margin_beyond_doubt);
-  }
-  if (minor_axis_px < medium_px) return transitions >= 4;
-  return true;
+  constexpr double doubtful_lead = 0.5;         // nats
+  const bool good =
+      ring.fit < good_fit && (ring.fit * minor_axis_px < fit_of_one_px || ring.margin > margin_beyond_doubt);
+  return good ? ring.lead : std::min(ring.lead, doubtful_lead);
 }
 
 /// Least rank of a look that shows the image as it is: its level. Sharpened looks have ranks of their own below it.
@@ -255,7 +259,8 @@ class TargetSearch {
                                 dot.sigma_px,
                                 diameter_of(dot.ellipse),
                                 decoded.ring.distance};
-    found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit});
+    const double lead = lead_by_size(decoded.ring, 2.0 * axes_of(dot.ellipse).semi_minor_px, library_.bits);
+    found_.push_back({target, dot.ellipse, lead, decoded.ring.fit});
     return Rejection::none;
   }
 
@@ -415,7 +420,7 @@ class TargetSearch {
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scanned, ring});
     const bool accepted =
         ring.accepted &&
-        (plain || (!is_doubtful(dot, ring) && is_telling(ring, 2.0 * axes.semi_minor_px, library_.bits)));
+        (plain || (!is_doubtful(dot, ring) && lead_by_size(ring, 2.0 * axes.semi_minor_px, library_.bits) > 0.0));
     return {accepted ? Rejection::none : Rejection::no_code, std::move(*scanned), ring};
   }
 
