@@ -46,7 +46,7 @@ struct Health {
   int targets_seen = 0;
   double reprojection_rms_px = 0.0;
   double contrast = 0.0;
-  std::string last_error;                      ///< one line, cut to 80 bytes; empty when the last frame was good
+  std::string last_error;  ///< one line, cut to 80 bytes; empty when the last frame was good
   std::string version;
   PoseState pose_state = PoseState::tracking;  ///< of the last frame
 };

@@ -24,17 +24,15 @@ struct DecodedRing {
   bool accepted = false;
 };
 
-/// Decodes rings by maximum likelihood over all codes and rotations of a library. Each bit's reading is normal about
-/// what the code predicts there, with its neighbours' blur, or, with a small probability, anything (dirt, cover): a
-/// bit that is neither colour then costs every code the same, a bit of the wrong colour only the codes it contradicts.
+/// Decodes rings by maximum likelihood over all codes and rotations of a library, black, white and covered bits allowed
+/// for (`RingEvidence`); [A] 2.3.6 to 2.3.8 with likelihoods in place of its similarity and probability.
 class RingDecoder {
  public:
   RingDecoder(const TargetLibrary& library, double max_unknown);
 
   /// The most likely code, for the light as the dot's shading has it, or, when that is not accepted, for the light that
-  /// fits the white bits of a first decoding. It is accepted when the wrong and unknown bits can be corrected for sure
-  /// (2 wrong + unknown < distance of the library), or when nothing but unknown bits is amiss and the other codes are
-  /// ruled out by two bits or more; and when the known bits fit well.
+  /// fits the white bits of a first decoding. It is accepted when it explains the ring well, clearly better than any
+  /// other id does (more clearly where part of the ring is covered), and when its bits reach across the ring.
   [[nodiscard]] DecodedRing decode(RingScan& scan) const;
 
   /// For rings so blurred that dot and blur cannot be told apart, nor the bits' borders be seen: the code whose blurred
