@@ -10,30 +10,12 @@
 #include <fmt/ranges.h>
 
 #include "lib/adjust/calibration_review.h"
+#include "lib/adjust/collinearity_error.h"
 #include "lib/camera/balanced_distortion.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
 namespace {
-
-// [B] equation 1 for one target in one image, in standard deviations of its centre.
-struct ReprojectionError {
-  ObservedPoint at;
-  double sigma_px, n_px, r0;
-
-  template <class T>
-  bool operator()(const T* interior, const T* turn, const T* center, const T* point, T* residual) const {
-    const T from_center[3] = {point[0] - center[0], point[1] - center[1], point[2] - center[2]};
-    T p[3];
-    ceres::AngleAxisRotatePoint(turn, from_center, p);
-    if (!(p[2] > T(0))) return false;
-    const T scale = interior[0] / (p[2] * n_px);
-    const auto [u, v] = distort_balanced(interior + 3, r0, T(p[0] * scale), T(p[1] * scale));
-    residual[0] = (at.x_px - interior[1] - n_px * u) / sigma_px;
-    residual[1] = (at.y_px - interior[2] - n_px * v) / sigma_px;
-    return true;
-  }
-};
 
 struct FieldError {
   Eigen::Vector3d stated_mm;
@@ -107,8 +89,8 @@ class Adjustment {
     problem_.emplace(options);
     for (Observation& o : observations_) {
       if (!robust && !o.used) continue;
-      auto* cost = new ceres::AutoDiffCostFunction<ReprojectionError, 2, kInteriorTerms, 3, 3, 3>(
-          new ReprojectionError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
+      auto* cost = new ceres::AutoDiffCostFunction<CollinearityError, 2, kInteriorTerms, 3, 3, 3>(
+          new CollinearityError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
       // Far below what a wrong id does and well above what a start value is off.
       auto* loss = robust ? new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px)) : nullptr;
       problem_->AddResidualBlock(cost, loss, interior_.data(), turns_[o.image].data(), centers_[o.image].data(),
@@ -141,7 +123,7 @@ class Adjustment {
 
   void find_residuals() {
     for (Observation& o : observations_) {
-      const ReprojectionError error{o.point.at, 1.0, start_.normalizer_px(), start_.distortion.r0};
+      const CollinearityError error{o.point.at, 1.0, start_.normalizer_px(), start_.distortion.r0};
       if (!error(interior_.data(), turns_[o.image].data(), centers_[o.image].data(), points_[o.point.id].data(),
                  o.residual_px.data()))
         o.residual_px.setConstant(1e6);  // behind the camera
@@ -175,8 +157,8 @@ class Adjustment {
     int count = 0;
     for (const Observation& o : observations_) {
       if (o.image != image) continue;
-      auto* cost = new ceres::AutoDiffCostFunction<ReprojectionError, 2, kInteriorTerms, 3, 3, 3>(
-          new ReprojectionError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
+      auto* cost = new ceres::AutoDiffCostFunction<CollinearityError, 2, kInteriorTerms, 3, 3, 3>(
+          new CollinearityError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
       auto* loss = new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px));
       double* point = points_[o.point.id].data();
       problem.AddResidualBlock(cost, loss, interior.data(), turn.data(), center.data(), point);
