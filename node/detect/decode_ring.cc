@@ -108,7 +108,7 @@ class StretchTables {
       for (std::size_t pattern = 0; pattern < table.size(); ++pattern) {
         for (int i = 0; i < length; ++i) {
           const auto bit = [&](int k) { return static_cast<int>((pattern >> (length + 1 - k)) & 1U); };
-          const auto at = static_cast<std::size_t>(first + i);
+          const auto at = static_cast<std::size_t>(first) + static_cast<std::size_t>(i);
           table[pattern] += log_likelihood(scan, at, bit(i), bit(i + 1), bit(i + 2));
         }
       }
