@@ -218,6 +218,6 @@ TEST_CASE("detect: hostile images give nothing, in bounded time") {
   for (int i = 0; i < 60000; ++i) {
     cv::circle(blobs, {static_cast<int>(random() % 2000), static_cast<int>(random() % 2000)}, 2, cv::Scalar(200), -1);
   }
-  const char* patience = std::getenv("IMPRINT_TEST_PATIENCE");  // sanitizer builds are slower
+  const char* patience = std::getenv("IMPRINT_TEST_PATIENCE");                           // sanitizer builds are slower
   CHECK(seconds_for(blobs) < 20.0 * (patience == nullptr ? 1.0 : std::atof(patience)));  // about 2 s on a core
 }
