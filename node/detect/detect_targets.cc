@@ -193,10 +193,10 @@ class TargetSearch {
     // Sharp images have 0.3 here; the estimate grows more slowly than the blur where there are no long edges.
     constexpr double blurred_px = 0.6;
     if (edge_blur_px(level, noise) < blurred_px) return;
+    double lowest = 0.0;
+    double highest = 0.0;
+    cv::minMaxLoc(level, &lowest, &highest);
     for (const double removed : {1.0, 1.5, 1.9}) {
-      double lowest = 0.0;
-      double highest = 0.0;
-      cv::minMaxLoc(level, &lowest, &highest);
       if (const auto sharp = sharpen(level, removed, noise, allowed_noise * (highest - lowest))) {
         looks_.push_back(
             {GreyImage(sharp->image), l, sharp->noise_gain * noise, removed * ImagePyramid::scale(l), BlobSize::small});
@@ -259,8 +259,7 @@ class TargetSearch {
                                 dot.sigma_px,
                                 diameter_of(dot.ellipse),
                                 decoded.ring.distance};
-    const double lead = lead_by_size(decoded.ring, 2.0 * axes_of(dot.ellipse).semi_minor_px, library_.bits);
-    found_.push_back({target, dot.ellipse, lead, decoded.ring.fit});
+    found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit});
     return Rejection::none;
   }
 
@@ -418,9 +417,8 @@ class TargetSearch {
       set_light(*scanned, Eigen::Vector2d::Zero(), correlated.light / std::max(0.1, response));
     }
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scanned, ring});
-    const bool accepted =
-        ring.accepted &&
-        (plain || (!is_doubtful(dot, ring) && lead_by_size(ring, 2.0 * axes.semi_minor_px, library_.bits) > 0.0));
+    if (!plain) ring.lead = lead_by_size(ring, 2.0 * axes.semi_minor_px, library_.bits);
+    const bool accepted = ring.accepted && (plain || (!is_doubtful(dot, ring) && ring.lead > 0.0));
     return {accepted ? Rejection::none : Rejection::no_code, std::move(*scanned), ring};
   }
 
