@@ -17,26 +17,12 @@
 #include "node/detect/detect_targets.h"
 #include "simulation/field_photos.h"
 #include "survey/survey.h"
+#include "tests/unit/survey/photographed_field.h"
 
 namespace {
 
 using namespace imprint;
 namespace fs = std::filesystem;
-
-// A reflex camera of the kind in [B] 2.2: 4288 x 2848 px of 5.5 um, 24 mm lens, distortion of an ordinary wide angle.
-CameraModel reflex_camera() {
-  CameraModel camera;
-  camera.id = "reflex";
-  camera.width_px = 4288;
-  camera.height_px = 2848;
-  camera.pixel_pitch_um = 5.5;
-  camera.focal_length_px = 4412.0;
-  camera.principal_point = {2159.3, 1410.8};
-  camera.distortion.radial = {-3.1e-2, 4.2e-3, -2.0e-4};
-  camera.distortion.tangential = {1.5e-4, -0.9e-4};
-  camera.distortion.affine = {0.8e-4, -0.5e-4};
-  return camera;
-}
 
 struct Photographed {
   FieldPhotos field;
