@@ -11,6 +11,12 @@ namespace imprint {
 inline constexpr int min_code_bits = 8;
 inline constexpr int max_code_bits = 20;
 
+/// Bit `index` along the ring, clockwise from the code's first, its highest: 1 is white. The ring is closed, `index`
+/// may be any.
+inline int bit_at(std::uint32_t code, int bits, int index) {
+  return static_cast<int>((code >> (bits - 1 - (index % bits + bits) % bits)) & 1U);
+}
+
 /// The code of `bits` bits turned by `steps` >= 0: its first `steps` bits move to its end.
 std::uint32_t rotated(std::uint32_t code, int bits, int steps);
 

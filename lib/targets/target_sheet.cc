@@ -8,6 +8,8 @@
 #include <cairo.h>
 #include <fmt/format.h>
 
+#include "lib/targets/code_distance.h"
+
 namespace imprint {
 namespace {
 
@@ -71,7 +73,7 @@ class SheetPainter {
     cairo_arc(context_, target.x_mm, target.y_mm, 0.5 * layout_.dot_diameter_mm, 0.0, two_pi);
     cairo_fill(context_);
     const int bits = library_.bits;
-    const auto white = [&](int bit) { return ((target.code.code >> (bits - 1 - bit % bits)) & 1U) != 0; };
+    const auto white = [&](int bit) { return bit_at(target.code.code, bits, bit) != 0; };
     bool any_black = false;
     for (int first = 0; first < bits; ++first) {
       any_black = any_black || !white(first);

@@ -7,10 +7,9 @@
 #include <numbers>
 #include <numeric>
 
-#include <Eigen/Cholesky>
-
 #include "lib/targets/code_distance.h"
 #include "node/detect/ring_evidence.h"
+#include "node/detect/ring_light.h"
 
 namespace imprint {
 namespace {
@@ -27,10 +26,6 @@ constexpr double hopeless = 32.0;
 constexpr double max_step =
     0.1;  // bits reach from the ring's inner edge to its outer one, letters and pads do not, ours
 constexpr double max_fit = 0.15;  // rms of the known bits; rings in clutter have levels at random
-
-int bit_of(std::uint32_t code, int bits, int index) {
-  return static_cast<int>((code >> ((2 * bits - 1 - index) % bits)) & 1U);
-}
 
 double log_likelihood(double reading, double expected, double sigma) {
   if (std::isnan(reading)) return std::log(cover_probability * cover_density);
@@ -85,9 +80,9 @@ bool is_even_across(const RingScan& scan) {
 /// What the code has the bit's reading be; `flipped`: were the bit of the other colour.
 double expected_reading(const RingScan& scan, std::uint32_t code, int bit, bool flipped) {
   const int bits = static_cast<int>(scan.reading.size());
-  const int own = bit_of(code, bits, bit);
-  return scan.response[static_cast<std::size_t>(bit)].reading(bit_of(code, bits, bit + bits - 1),
-                                                              flipped ? 1 - own : own, bit_of(code, bits, bit + 1));
+  const int own = bit_at(code, bits, bit);
+  return scan.response[static_cast<std::size_t>(bit)].reading(bit_at(code, bits, bit - 1), flipped ? 1 - own : own,
+                                                              bit_at(code, bits, bit + 1));
 }
 
 /// Whether the bit shows the colour that the code has there.
@@ -137,68 +132,14 @@ class StretchTables {
   std::vector<std::vector<double>> tables_;
 };
 
-/// Light level and slope by least squares of the logarithm of the white bits' readings, drawn towards even light; false
-/// when too few bits are white.
-bool fit_light(RingScan& scan, std::uint32_t code, int bits) {
-  Eigen::Matrix3d normal = Eigen::Vector3d(0.1, 0.3, 0.3).asDiagonal();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  int white = 0;
-  for (int i = 0; i < bits; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const double even = scan.response[at].own +
-                        scan.response[at].beside * (bit_of(code, bits, i + bits - 1) + bit_of(code, bits, i + 1));
-    const double ratio = (scan.reading[at] - scan.response[at].floor) / even;
-    if (bit_of(code, bits, i) == 0 || !(ratio > 0.1)) continue;
-    const Eigen::Vector3d row(1.0, scan.place[at].x(), scan.place[at].y());
-    normal += row * row.transpose();
-    right += std::log(ratio) * row;
-    ++white;
-  }
-  if (white < 2) return false;
-  const Eigen::Vector3d fitted = normal.ldlt().solve(right);
+/// Has the light be that of the ring's white bits; false when they do not tell it.
+bool fit_light(RingScan& scan, std::uint32_t code) {
+  const auto light = light_on_ring(scan, code);
   // The paint of dot and ring is one: where the ring as a whole were darker, it would be another thing's.
   constexpr double most_level = 0.7;  // logarithm
-  if (std::abs(fitted[0]) > most_level) return false;
-  set_light(scan, fitted.tail<2>(), std::exp(fitted[0]));
+  if (!light || std::abs(std::log(light->level)) > most_level) return false;
+  set_light(scan, light->slope, light->level);
   return true;
-}
-
-}  // namespace
-
-namespace {
-
-constexpr int profile_columns_per_bit = 4;
-
-/// A closed row of values, each the mean of `factor` columns; mean 0, norm 1. `norm`: what the norm was.
-std::vector<double> normalized(const std::vector<double>& columns, int factor, double* norm) {
-  std::vector<double> values(columns.size() / static_cast<std::size_t>(factor), 0.0);
-  for (std::size_t i = 0; i < columns.size(); ++i) values[i / static_cast<std::size_t>(factor)] += columns[i] / factor;
-  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-  double squares = 0.0;
-  for (double& value : values) {
-    value -= mean;
-    squares += value * value;
-  }
-  *norm = std::sqrt(squares);
-  for (double& value : values) value /= std::max(*norm, 1e-9);
-  return values;
-}
-
-/// The code's profile along the ring under a blur of `sigma` bits, columns_per_bit values a bit.
-std::vector<double> blurred_profile(std::uint32_t code, int bits, double sigma) {
-  std::vector<double> columns;
-  for (int i = 0; i < bits * columns_per_bit; ++i) {
-    const double at = (i + 0.5) / columns_per_bit;
-    double value = 0.0;
-    for (int bit = -2; bit <= 2; ++bit) {  // bits farther off give less than 0.3 % at the largest sigma
-      const int index = static_cast<int>(at) + bit;
-      if (bit_of(code, bits, (index + bits) % bits) == 0) continue;
-      const double from = (index - at) / sigma;
-      value += 0.5 * (std::erfc(-(from + 1.0 / sigma) / std::numbers::sqrt2) - std::erfc(-from / std::numbers::sqrt2));
-    }
-    columns.push_back(value);
-  }
-  return columns;
 }
 
 }  // namespace
@@ -217,14 +158,6 @@ RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
   const int correctable = (min_distance_ - 1) / 2;
   least_white_ = std::max(0, least_white_ - correctable);
   most_white_ = std::min(bits_, most_white_ + correctable);
-  for (std::size_t i = 0; i < codes_.size(); ++i) {
-    for (const double sigma : {0.2, 0.35, 0.5, 0.65}) {
-      Profile profile{i, {}, 0.0};
-      profile.columns = normalized(blurred_profile(codes_[i].code, bits_, sigma),
-                                   columns_per_bit / profile_columns_per_bit, &profile.light);
-      profiles_.push_back(std::move(profile));
-    }
-  }
 }
 
 struct RingDecoder::Match {
@@ -257,7 +190,7 @@ DecodedRing RingDecoder::decode(RingScan& scan) const {
   constexpr double even_enough = 0.05;
   for (int round = 0; round < rounds && (!ring.accepted || ring.profile > even_enough); ++round) {
     RingScan relit = scan;
-    if (!fit_light(relit, ring.code, bits_)) break;
+    if (!fit_light(relit, ring.code)) break;
     const DecodedRing next = decode_once(relit);
     const bool better = next.unknown < ring.unknown || (next.unknown == ring.unknown && next.profile < ring.profile);
     if (next.wrong > 0 || !better || (ring.accepted && !next.accepted))
@@ -266,47 +199,6 @@ DecodedRing RingDecoder::decode(RingScan& scan) const {
     scan = std::move(relit);
   }
   return ring;
-}
-
-RingDecoder::Correlated RingDecoder::correlate(const RingScan& scan) const {
-  Correlated result;
-  if (std::any_of(scan.columns.begin(), scan.columns.end(), [](double v) { return std::isnan(v); })) return result;
-  constexpr int factor = columns_per_bit / profile_columns_per_bit;
-  double norm = 0.0;
-  const std::vector<double> seen = normalized(scan.columns, factor, &norm);
-  const std::size_t n = seen.size();
-  std::vector<double> best_of_id(codes_.size(), -1.0);
-  double best = -1.0;
-  std::size_t best_code = 0;
-  for (const Profile& profile : profiles_) {
-    for (std::size_t turn = 0; turn < n; ++turn) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < n - turn; ++i) sum += profile.columns[i] * seen[i + turn];
-      for (std::size_t i = n - turn; i < n; ++i) sum += profile.columns[i] * seen[i + turn - n];
-      best_of_id[profile.code] = std::max(best_of_id[profile.code], sum);
-      if (sum <= best) continue;
-      best = sum;
-      best_code = profile.code;
-      result.turn = static_cast<int>(turn) * factor;
-      result.light = norm / profile.light;
-    }
-  }
-  best_of_id[best_code] = -1.0;
-  const double second = *std::max_element(best_of_id.begin(), best_of_id.end());
-  const double left = 1.0 - best * best;
-  constexpr double most_left = 0.08;        // share of the columns' variance
-  constexpr double least_advantage = 0.05;  // more left by the next id
-  constexpr double least_light = 0.25;
-  constexpr double most_light = 1.5;
-  DecodedRing& ring = result.ring;
-  ring.id = codes_[best_code].id;
-  ring.code = codes_[best_code].code;
-  ring.fit = std::sqrt(left / 4.0);  // about the rms in bits' light: half the bits are white
-  ring.profile = ring.fit;
-  ring.margin = (1.0 - second * second - left) / least_advantage;
-  ring.lead = std::numeric_limits<double>::infinity();  // its margin is not in nats
-  ring.accepted = left < most_left && ring.margin > 1.0 && result.light > least_light && result.light < most_light;
-  return result;
 }
 
 DecodedRing RingDecoder::decode_plainly(const RingScan& scan) const {
@@ -427,9 +319,9 @@ void RingDecoder::compare_profile(const RingScan& scan, DecodedRing& ring) const
   int count = 0;
   for (int i = 0; i < bits_; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const int before = bit_of(ring.code, bits_, i + bits_ - 1);
-    const int own = bit_of(ring.code, bits_, i);
-    const int after = bit_of(ring.code, bits_, i + 1);
+    const int before = bit_at(ring.code, bits_, i - 1);
+    const int own = bit_at(ring.code, bits_, i);
+    const int after = bit_at(ring.code, bits_, i + 1);
     if (!is_known(scan, ring.code, i)) continue;
     const double step = unexpected_step(scan, at);
     if (!std::isnan(step)) steps += step * step / bits_;

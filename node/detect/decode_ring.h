@@ -35,16 +35,6 @@ class RingDecoder {
   /// other id does (more clearly where part of the ring is covered), and when its bits reach across the ring.
   [[nodiscard]] DecodedRing decode(RingScan& scan) const;
 
-  /// For rings so blurred that dot and blur cannot be told apart, nor the bits' borders be seen: the code whose blurred
-  /// profile, at any turn, correlates best with the scan's columns. Accepted when little is left unexplained and
-  /// clearly more by any other id. `turn`: columns from the scan's first to the code's first.
-  struct Correlated {
-    DecodedRing ring;
-    int turn = 0;
-    double light = 1.0;  ///< of white bits against black ones, in units of the dot's
-  };
-  [[nodiscard]] Correlated correlate(const RingScan& scan) const;
-
   /// The code that the bits are when each is taken for white above the middle between black and white; accepted when
   /// it is in the library as read. No error is corrected, none is noticed.
   [[nodiscard]] DecodedRing decode_plainly(const RingScan& scan) const;
@@ -69,12 +59,6 @@ class RingDecoder {
   int least_white_;
   int most_white_;
   std::vector<TargetCode> codes_;
-  struct Profile {
-    std::size_t code;             // index
-    std::vector<double> columns;  // mean 0, norm 1
-    double light;                 // what its norm is before
-  };
-  std::vector<Profile> profiles_;
 };
 
 }  // namespace imprint

@@ -12,6 +12,8 @@
 #include "node/detect/find_blobs.h"
 #include "node/detect/fit_dot.h"
 #include "node/detect/image_pyramid.h"
+#include "node/detect/ring_correlator.h"
+#include "node/detect/ring_light.h"
 #include "node/detect/scan_ring.h"
 #include "node/detect/sharpen.h"
 #include "node/detect/star_ellipse.h"
@@ -114,6 +116,7 @@ class TargetSearch {
       : pyramid_(image, levels_for(config.max_dot_px)),
         library_(library),
         decoder_(library, config.max_unknown),
+        correlator_(library),
         config_(config),
         noise_(image_noise(pyramid_.level(0))),
         trace_(trace) {}
@@ -269,8 +272,8 @@ class TargetSearch {
     constexpr double small_px = 10.0;
     const int rounds = diameter_of(dot.ellipse) < small_px ? 3 : 1;
     for (int round = 0; round < rounds; ++round) {
-      const auto fine =
-          fit_at_full_resolution(dot, [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
+      const auto fine = fit_at_full_resolution(dot, shading_prior(decoded),
+                                               [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
       if (!fine || is_poor(*fine, noise_at(dot), is_tiny(dot) ? flaws_before_ring : flaws))
         return Rejection::poor_ellipse;
       DecodedDot again = decode(*fine, look);
@@ -292,15 +295,21 @@ class TargetSearch {
     return 2.0 * axes_of(dot.ellipse).semi_minor_px < tiny_px;
   }
 
-  [[nodiscard]] std::optional<FittedDot> fit_at_full_resolution(const FittedDot& dot,
+  /// The ring, two to three times as wide, tells the slope of the light better than the dot does.
+  static ShadingPrior shading_prior(const DecodedDot& decoded) {
+    const auto light = light_on_ring(decoded.scan, decoded.ring.code);
+    return light ? ShadingPrior{light->slope, light->slope_sigma} : ShadingPrior{};
+  }
+
+  [[nodiscard]] std::optional<FittedDot> fit_at_full_resolution(const FittedDot& dot, const ShadingPrior& shading,
                                                                 const LightAt& other_light) const {
     if (!is_tiny(dot)) {
-      return fit_dot(pyramid_.level(0), {dot.ellipse, dot.black, dot.contrast, dot.blur_px}, other_light);
+      return fit_dot(pyramid_.level(0), {dot.ellipse, dot.black, dot.contrast, dot.blur_px, shading}, other_light);
     }
     constexpr int doubled = -1;
     const FittedDot in_doubled = to_level(dot, doubled);
     auto fine = fit_dot(GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled),
-                        {in_doubled.ellipse, dot.black, dot.contrast, in_doubled.blur_px},
+                        {in_doubled.ellipse, dot.black, dot.contrast, in_doubled.blur_px, shading},
                         [&](const Eigen::Vector2d& p) { return other_light(ImagePyramid::from_level(p, doubled)); });
     if (!fine) return std::nullopt;
     fine = from_level(*fine, doubled);
@@ -407,9 +416,13 @@ class TargetSearch {
     auto scanned = scan(dot, look);
     if (!scanned) return {Rejection::outside, {}, {}};
     const bool plain = config_.decoder == Decoder::plain;
-    DecodedRing ring = plain ? decoder_.decode_plainly(*scanned) : decoder_.decode(*scanned);
-    if (!plain && look.is_sharpened()) {
-      const RingDecoder::Correlated correlated = decoder_.correlate(*scanned);
+    DecodedRing ring;
+    if (plain) {
+      ring = decoder_.decode_plainly(*scanned);
+    } else if (!look.is_sharpened()) {
+      ring = decoder_.decode(*scanned);
+    } else {
+      const RingCorrelator::Correlated correlated = correlator_.correlate(*scanned);
       ring = correlated.ring;
       scanned = scan(dot, look, scanned->first_column + correlated.turn);
       if (!scanned) return {Rejection::outside, {}, {}};
@@ -482,6 +495,7 @@ class TargetSearch {
   ExaminedPlaces examined_;
   const TargetLibrary& library_;
   RingDecoder decoder_;
+  RingCorrelator correlator_;
   const DetectConfig& config_;
   double noise_;
   DetectionTrace* trace_;

@@ -92,8 +92,7 @@ class DotModel {
   Eigen::Matrix2d root_;
 };
 
-/// Grey values in the window; in large dots only every second or third row and column of what is far from the edge,
-/// with the weight of those left out.
+/// Grey values in the window; in large dots only every second or fourth row and column of what is far from the edge.
 std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
   const double semi_minor = axes_of(guess).semi_minor_px;
   const double window_radii = std::clamp(1.0 + 2.0 / semi_minor, min_window_radii, max_window_radii);
@@ -116,12 +115,17 @@ std::vector<Sample> samples_of(const GreyImage& image, const Ellipse& guess) {
       if (!near_edge && (x % stride != 0 || y % stride != 0)) continue;
       // The window fades out over a px: a sharp border would move in steps with the pixel grid.
       const double fade = std::clamp((window_radii - radius) * semi_minor, 0.0, 1.0);
-      const double weight = near_edge ? 1.0 : static_cast<double>(stride * stride);
-      samples.push_back({p - guess.center, image.pixel(x, y), weight * fade});
+      samples.push_back({p - guess.center, image.pixel(x, y), fade});
     }
   }
   return samples;
 }
+
+/// Draws the shading towards what is known of it: information (in squared grey levels) and the value itself.
+struct ShadingHold {
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d shading = Eigen::Vector2d::Zero();
+};
 
 struct NormalEquations {
   Matrix matrix = Matrix::Zero();
@@ -131,7 +135,8 @@ struct NormalEquations {
 };
 
 /// Weights fall as 1 / (1 + (r/scale)^2)^2 of the residual (Geman-McClure); the cost is its own.
-NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& dot, double scale, FitFreedom freedom) {
+NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& dot, double scale,
+                                 const ShadingHold& hold, FitFreedom freedom) {
   NormalEquations equations;
   const DotModel model(dot);
   Vector gradient;
@@ -144,12 +149,10 @@ NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& 
     equations.cost += sample.weight * residual * residual / (1.0 + ratio);
     equations.weight += weight;
   }
-  // In a dot of few px a shading looks like a shift of the centre: there it is held at zero.
-  const double small_radii = 5.0 / axes_of({Eigen::Vector2d::Zero(), dot.shape}).semi_minor_px;
-  const double hold = 4.0 * dot.contrast * dot.contrast * std::pow(small_radii, 6.0);
-  equations.matrix.diagonal().tail<2>().array() += hold;
-  equations.right.tail<2>() -= hold * dot.shading;
-  equations.cost += hold * dot.shading.squaredNorm();
+  const Eigen::Vector2d off = dot.shading - hold.shading;
+  equations.matrix.bottomRightCorner<2, 2>() += hold.information;
+  equations.right.tail<2>() -= hold.information * off;
+  equations.cost += off.dot(hold.information * off);
   if (freedom == FitFreedom::place) {
     const double firm = 1e6 * (1.0 + equations.matrix.diagonal().maxCoeff());
     equations.matrix.diagonal().segment<4>(2).array() += firm;
@@ -159,10 +162,10 @@ NormalEquations normal_equations(const std::vector<Sample>& samples, const Dot& 
 }
 
 /// Levenberg-Marquardt from `dot`; false when it leads nowhere.
-bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, FitFreedom freedom, Dot& dot,
-            NormalEquations& equations) {
+bool adjust(const std::vector<Sample>& samples, double scale, const ShadingHold& hold, int max_steps,
+            FitFreedom freedom, Dot& dot, NormalEquations& equations) {
   double damping = 1e-3;
-  equations = normal_equations(samples, dot, scale, freedom);
+  equations = normal_equations(samples, dot, scale, hold, freedom);
   for (int i = 0; i < max_steps; ++i) {
     Matrix damped = equations.matrix;
     damped.diagonal() *= 1.0 + damping;
@@ -172,7 +175,7 @@ bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Fit
     const bool too_far = step.segment<3>(2).cwiseAbs().maxCoeff() > 0.7;
     const Dot next = dot.stepped(too_far ? Vector(step * 0.5) : step);
     if (!(next.shape.determinant() > 0.0)) return false;
-    const NormalEquations there = normal_equations(samples, next, scale, freedom);
+    const NormalEquations there = normal_equations(samples, next, scale, hold, freedom);
     const bool better = there.cost <= equations.cost;
     if (better) {
       dot = next;
@@ -190,6 +193,18 @@ bool adjust(const std::vector<Sample>& samples, double scale, int max_steps, Fit
 }  // namespace
 
 namespace {
+
+/// In a dot of few px a shading looks like a shift of the centre: there it is held, more so the more is known of it.
+ShadingHold hold_shading(const Dot& dot, const ShadingPrior& prior, double noise) {
+  const Ellipse ellipse{Eigen::Vector2d::Zero(), dot.shape};
+  const Eigen::Matrix2d frame = frame_of(ellipse);
+  ShadingHold hold;
+  hold.shading = frame.inverse() * prior.slope;
+  const double small_radii = 5.0 / axes_of(ellipse).semi_minor_px;
+  hold.information = 4.0 * dot.contrast * dot.contrast * std::pow(small_radii, 6.0) * Eigen::Matrix2d::Identity();
+  hold.information += noise * noise / (prior.sigma * prior.sigma) * frame.transpose() * frame;
+  return hold;
+}
 
 FittedDot rescaled(const FittedDot& dot, double scale, const Eigen::Vector2d& center) {
   FittedDot full = dot;
@@ -221,11 +236,16 @@ std::optional<FittedDot> fit_dot(const GreyImage& image, const DotGuess& start, 
   Dot dot{Eigen::Vector2d::Zero(), guess.shape, start.blur_px, start.black, start.contrast, Eigen::Vector2d::Zero()};
   NormalEquations equations;
   // Twice: with a wide scale, then with the noise known.
-  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, 4, freedom, dot, equations) || !(dot.contrast > 0.0))
+  double noise = 0.5 * residual_scale * dot.contrast;
+  if (!adjust(samples, residual_scale * 3.0 * dot.contrast, hold_shading(dot, start.shading, noise), 4, freedom, dot,
+              equations) ||
+      !(dot.contrast > 0.0))
     return std::nullopt;
-  double noise = std::sqrt(equations.cost / std::max(1.0, equations.weight));
+  noise = std::sqrt(equations.cost / std::max(1.0, equations.weight));
   const double scale = std::max(residual_scale * dot.contrast, 5.0 * noise);
-  if (!adjust(samples, scale, 10, freedom, dot, equations) || !(dot.contrast > 0.0)) return std::nullopt;
+  if (!adjust(samples, scale, hold_shading(dot, start.shading, noise), 10, freedom, dot, equations) ||
+      !(dot.contrast > 0.0))
+    return std::nullopt;
 
   FittedDot fitted;
   fitted.ellipse = {guess.center + dot.center, dot.shape};

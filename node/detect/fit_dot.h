@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <optional>
 
 #include "node/detect/ellipse.h"
@@ -20,12 +21,20 @@ struct FittedDot {
       Eigen::Vector2d::Zero();  ///< relative change of the light per px; zero where not significant
 };
 
+/// What is known of the shading over a dot beforehand, which in a small dot is hardly told from a shift of its centre:
+/// frame_of(ellipse) * shading is normal about `slope` (per dot radius).
+struct ShadingPrior {
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  double sigma = std::numeric_limits<double>::infinity();  ///< of each coordinate
+};
+
 /// What a fit begins with.
 struct DotGuess {
   Ellipse ellipse;
   double black = 0.0;
   double contrast = 0.0;
   double blur_px = 0.8;
+  ShadingPrior shading = {};
 };
 
 /// The dot near `guess` (in px of `image`) by least squares of all grey values within 1.5 radii against a blurred

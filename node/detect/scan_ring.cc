@@ -8,6 +8,8 @@
 
 #include <Eigen/LU>
 
+#include "lib/targets/code_distance.h"
+
 namespace imprint {
 namespace {
 
@@ -217,7 +219,6 @@ double ring_light_at(const Eigen::Vector2d& place, const FittedDot& dot, const R
   const double turn = (std::atan2(in_frame.y(), in_frame.x()) - scan.first_angle) / two_pi;
   const double at = (turn - std::floor(turn)) * bits;  // in bits from the first one's beginning
   const int bit = std::min(bits - 1, static_cast<int>(at));
-  const auto is_white = [&](int i) { return static_cast<int>((code >> (bits - 1 - (i + bits) % bits)) & 1U); };
   BitResponse response = scan.response[static_cast<std::size_t>(bit)];
   const double radial_sigma = dot.blur_px * (dot.ellipse.shape * (place - dot.ellipse.center)).norm() / radius;
   const double inner = geometry.ring_inner_radius / geometry.dot_radius;
@@ -225,7 +226,8 @@ double ring_light_at(const Eigen::Vector2d& place, const FittedDot& dot, const R
   response.floor = 0.0;
   response.radial = normal_cdf((outer - radius) / radial_sigma) - normal_cdf((inner - radius) / radial_sigma);
   response.angular_sigma *= 0.5 * (inner + outer) / std::max(radius, 0.5);
-  return dot.contrast * response.column_reading(at - bit - 0.5, is_white(bit - 1), is_white(bit), is_white(bit + 1));
+  return dot.contrast * response.column_reading(at - bit - 0.5, bit_at(code, bits, bit - 1), bit_at(code, bits, bit),
+                                                bit_at(code, bits, bit + 1));
 }
 
 Eigen::Vector2d light_slope(const FittedDot& dot) { return frame_of(dot.ellipse) * dot.shading; }

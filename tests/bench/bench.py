@@ -4,6 +4,7 @@
 stages    renders one frame of the forge scene; prints the time of every stage beside cv::Canny, and of the renderer.
 accuracy  renders and measures several seeds of both scenes; prints the errors against the truth.
 targets   the paper's target benchmark, recall and precision beside OpenCV's ArUco; only when asked for.
+centers   the spread of rendered targets' centres beside the bound, their bias, the stated sigma; only when asked for.
 calibration  tables 3 to 5 and figure 9 of paper B on rendered frames, and 200 repetitions; only when asked for.
 survey    60 rendered photographs of a target field, surveyed and held against the truth; only when asked for.
 clutter   200 frames of 4 megapixels without targets: what is claimed to be one; only when asked for.
@@ -73,7 +74,7 @@ def print_row(scene, observations, seed, values):
 
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    papers = {"targets": "targets", "clutter": "targets", "calibration": "calibration", "survey": "survey"}
+    papers = {"targets": "targets", "clutter": "targets", "centers": "targets", "calibration": "calibration", "survey": "survey"}
     parser.add_argument("name", nargs="?", choices=["stages", "accuracy", *papers], help="default: stages and accuracy")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)

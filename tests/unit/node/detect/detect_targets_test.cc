@@ -42,18 +42,18 @@ std::vector<DetectedTarget> detect(const cv::Mat& image) { return detect_targets
 
 }  // namespace
 
-TEST_CASE("detect: a centre has no bias beyond 0.01 px at any phase of the pixel grid") {
-  for (const double radius : {3.0, 8.0, 20.0}) {
+TEST_CASE("detect: a centre is at its place at any phase of the pixel grid") {
+  // Rounding to grey values alone moves a centre by some 0.001 px; a dot of 6 px has few pixels to tell it.
+  for (const auto& [radius, allowed_px] : {std::pair{3.0, 0.008}, {8.0, 0.004}, {20.0, 0.003}}) {
     for (const double phase : {0.0, 0.21, 0.5, 0.77}) {
-      cv::Mat canvas = ground(160, 160);
       const Eigen::Vector2d center(80.0 + phase, 79.0 + 0.6 * phase);
-      draw(canvas, DrawnTarget::seen(code_of(3), center, radius, 17.0, 30.0, 40.0));
-      const auto found = detect(expose(canvas, 0.8, 0.0));
+      const auto target = DrawnTarget::seen(code_of(3), center, radius, 17.0, 30.0, 40.0);
+      const auto found = detect(expose(draw_through_lens({target}, {160, 160}, 0.8), 0.0, 0.0));
       INFO("radius " << radius << " px, phase " << phase);
       REQUIRE(found.size() == 1);
       CHECK(found[0].id == 3);
-      CHECK(std::abs(found[0].center.x_px - center.x()) < 0.01);
-      CHECK(std::abs(found[0].center.y_px - center.y()) < 0.01);
+      CHECK(std::abs(found[0].center.x_px - center.x()) < allowed_px);
+      CHECK(std::abs(found[0].center.y_px - center.y()) < allowed_px);
       // Mean of the axes: 2 r (1 + cos 30 deg) / 2; small dots share size with blur.
       CHECK(found[0].dot_diameter_px == Approx(radius * (1.0 + std::cos(std::numbers::pi / 6.0))).epsilon(0.05));
     }
