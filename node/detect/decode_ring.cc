@@ -63,6 +63,13 @@ double unexpected_step(const RingScan& scan, std::size_t bit) {
   return weight * (step - response.step) / std::max(1.0, response.light);
 }
 
+/// Mean of the middle half of a bit's columns.
+double middle_of(const std::vector<double>& columns, std::size_t bit) {
+  constexpr int left_out = columns_per_bit / 4;
+  const auto begin = columns.begin() + static_cast<std::ptrdiff_t>(bit * columns_per_bit);
+  return std::accumulate(begin + left_out, begin + columns_per_bit - left_out, 0.0) / (columns_per_bit - 2 * left_out);
+}
+
 /// Whether at least half the bits reach over the whole width of the ring, or leave all of it dark: what covers do not
 /// hide of a ring does, letters and pads do not.
 bool is_even_across(const RingScan& scan) {
@@ -143,6 +150,24 @@ bool fit_light(RingScan& scan, std::uint32_t code) {
 }
 
 }  // namespace
+
+bool is_open(const RingScan& scan, std::uint32_t code) {
+  const int bits = static_cast<int>(scan.reading.size());
+  int white = 0;
+  int open = 0;
+  for (int bit = 0; bit < bits; ++bit) {
+    const auto at = static_cast<std::size_t>(bit);
+    const BitResponse& response = scan.response[at];
+    const auto goes_on = [&](const std::vector<double>& columns, double expected) {
+      const double half_way = 0.5 * (response.radial + expected) * response.light;
+      return middle_of(columns, at) > half_way + 2.0 * scan.noise;
+    };
+    if (bit_at(code, bits, bit) == 0 || std::isnan(middle_of(scan.outside, at))) continue;
+    ++white;
+    if (goes_on(scan.inside, response.inside) || goes_on(scan.outside, response.outside)) ++open;
+  }
+  return 2 * open > white;
+}
 
 RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
     : bits_(library.bits),
@@ -287,7 +312,7 @@ DecodedRing RingDecoder::decode_once(const RingScan& scan) const {
   constexpr double most_cost = 13.5;  // a cover over a few bits costs 9 to 11; what texture feigns costs more, ours
   ring.lead = std::min(ring.margin - least_margin(ring), most_cost - ring.cost);
   ring.accepted = ring.lead > 0.0 && ring.covered < max_unknown_ && ring.fit < max_fit && ring.profile < max_profile &&
-                  ring.step < max_step;
+                  ring.step < max_step && !is_open(scan, ring.code);
   return ring;
 }
 

@@ -24,6 +24,10 @@ struct DecodedRing {
   bool accepted = false;
 };
 
+/// Whether most white bits of `code` (its first bit where the scan's is) go on inside or outside of the ring, where a
+/// target has its ground: discs beside a dot do.
+bool is_open(const RingScan& scan, std::uint32_t code);
+
 /// Decodes rings by maximum likelihood over all codes and rotations of a library, black, white and covered bits allowed
 /// for (`RingEvidence`); [A] 2.3.6 to 2.3.8 with likelihoods in place of its similarity and probability.
 class RingDecoder {

@@ -2,36 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "lib/targets/code_distance.h"
 #include "node/detect/decode_ring.h"
 #include "node/detect/detect_config.h"
 #include "node/detect/detection_trace.h"
+#include "node/detect/examined_places.h"
 #include "node/detect/find_blobs.h"
 #include "node/detect/fit_dot.h"
+#include "node/detect/found_targets.h"
 #include "node/detect/image_pyramid.h"
+#include "node/detect/looks.h"
 #include "node/detect/ring_correlator.h"
 #include "node/detect/ring_light.h"
 #include "node/detect/scan_ring.h"
-#include "node/detect/sharpen.h"
 #include "node/detect/star_ellipse.h"
 
 namespace imprint {
 namespace {
-
-/// The smallest ellipse that the finest level answers for; each level doubles it.
-int levels_for(double max_dot_px) {
-  int levels = 1;
-  while (2.0 * max_level_semi_minor_px * ImagePyramid::scale(levels - 1) < max_dot_px) ++levels;
-  return levels;
-}
-
-double diameter_of(const Ellipse& ellipse) {
-  const EllipseAxes axes = axes_of(ellipse);
-  return axes.semi_major_px + axes.semi_minor_px;
-}
 
 /// A centre less sure than this share of the dot's diameter is no dot's: texture that happens to look like one.
 constexpr double max_sigma_of_diameter = 0.04;
@@ -60,56 +49,6 @@ double lead_by_size(const DecodedRing& ring, double minor_axis_px, int bits) {
   return good ? ring.lead : std::min(ring.lead, doubtful_lead);
 }
 
-/// Least rank of a look that shows the image as it is: its level. Sharpened looks have ranks of their own below it.
-constexpr int plain_rank = -1;
-
-/// Ellipses already looked at: one dot is found from several maxima, on two levels. On a finer level it gets another
-/// look, since the coarser one may have had too few pixels.
-class ExaminedPlaces {
- public:
-  [[nodiscard]] bool has_like(const Ellipse& ellipse, int rank) const {
-    const double diameter = diameter_of(ellipse);
-    const auto [x, y] = cell_of(ellipse.center);
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const auto cell = cells_.find({x + dx, y + dy});
-        if (cell == cells_.end()) continue;
-        for (const Place& known : cell->second) {
-          constexpr double near = 0.2;      // radii
-          constexpr double similar = 0.15;  // share of the diameter
-          const bool seen_as_well =
-              known.rank == rank || (rank >= plain_rank && known.rank <= rank && known.rank >= plain_rank);
-          if (seen_as_well && known.ellipse.radius_of(ellipse.center) < near &&
-              std::abs(diameter_of(known.ellipse) - diameter) < similar * diameter) {
-            return true;
-          }
-        }
-      }
-    }
-    return false;
-  }
-  void add(const Ellipse& ellipse, int rank) { cells_[cell_of(ellipse.center)].push_back({ellipse, rank}); }
-
- private:
-  struct Place {
-    Ellipse ellipse;
-    int rank;
-  };
-  static std::pair<int, int> cell_of(const Eigen::Vector2d& p) {
-    constexpr double cell_px = 32.0;
-    return {static_cast<int>(std::floor(p.x() / cell_px)), static_cast<int>(std::floor(p.y() / cell_px))};
-  }
-  std::map<std::pair<int, int>, std::vector<Place>> cells_;
-};
-
-/// A target with what decides between two that claim the same id or place.
-struct Found {
-  DetectedTarget target;
-  Ellipse ellipse;
-  double lead = 0.0;
-  double fit = 0.0;
-};
-
 class TargetSearch {
  public:
   TargetSearch(const cv::Mat& image, const TargetLibrary& library, const DetectConfig& config, DetectionTrace* trace)
@@ -119,10 +58,10 @@ class TargetSearch {
         correlator_(library),
         config_(config),
         noise_(image_noise(pyramid_.level(0))),
+        looks_(choose_looks(pyramid_, noise_, config)),
         trace_(trace) {}
 
   std::vector<DetectedTarget> run() {
-    choose_looks();
     for (std::size_t i = 0; i < looks_.size(); ++i) collect_candidates(i);
     // The best ellipses first, so that the parts of a target's ring are known when their turn comes.
     std::stable_sort(candidates_.begin(), candidates_.end(),
@@ -135,23 +74,10 @@ class TargetSearch {
       if (rejection == Rejection::no_code) ++unread_;
       if (rejection != Rejection::none) reject(candidate.full, rejection);
     }
-    drop_unlikely();
-    return each_id_once();
+    return choose_targets(std::move(found_), unread_, trace_);
   }
 
  private:
-  /// An image that dots are looked for in: a level of the pyramid, the image doubled, or a level with blur taken out.
-  struct Look {
-    GreyImage grey;
-    int level = 0;
-    double noise = 0.0;            // of its grey values
-    double removed_blur_px = 0.0;  // px of the image
-    BlobSize blobs = BlobSize::small;
-
-    [[nodiscard]] bool is_sharpened() const { return removed_blur_px > 0.0; }
-    /// Looks of one rank see the same.
-    [[nodiscard]] int rank() const { return is_sharpened() ? -100 - cvRound(8.0 * removed_blur_px) : level; }
-  };
   struct DecodedDot {
     Rejection rejection = Rejection::none;
     RingScan scan;
@@ -163,49 +89,6 @@ class TargetSearch {
     Ellipse full;      // px of the image
     double doubt = 0.0;
   };
-
-  /// The finest level that the smallest dot, seen at 72 degrees, needs.
-  [[nodiscard]] int first_level() const {
-    constexpr double foreshortening = 0.3;
-    int l = 0;
-    while (l + 1 < pyramid_.levels() &&
-           2.0 * min_level_semi_minor_px * ImagePyramid::scale(l + 1) <= foreshortening * config_.min_dot_px)
-      ++l;
-    return l;
-  }
-
-  void choose_looks() {
-    const int first = first_level();
-    constexpr double tiny_px = 4.0;
-    if (first == 0 && config_.min_dot_px < tiny_px) {
-      looks_.push_back({GreyImage(pyramid_.level(0).mat(), GreyImage::Size::doubled), -1, noise_, 0.0, BlobSize::tiny});
-    }
-    for (int l = first; l < pyramid_.levels(); ++l) {
-      looks_.push_back({pyramid_.level(l), l, noise_ / ImagePyramid::scale(l)});
-      if (l > 0) add_sharpened_looks(l);
-    }
-  }
-
-  /// Where even the sharpest edges are blurred over a px of the level, dots some px wide are lost in their rings: looks
-  /// with some of that blur taken out.
-  void add_sharpened_looks(int l) {
-    constexpr double rounding = 0.3;        // of grey values, as a standard deviation
-    constexpr double allowed_noise = 0.04;  // share of the grey values' range
-    const double noise = std::max(rounding, noise_) / ImagePyramid::scale(l);
-    const cv::Mat& level = pyramid_.level(l).mat();
-    // Sharp images have 0.3 here; the estimate grows more slowly than the blur where there are no long edges.
-    constexpr double blurred_px = 0.6;
-    if (edge_blur_px(level, noise) < blurred_px) return;
-    double lowest = 0.0;
-    double highest = 0.0;
-    cv::minMaxLoc(level, &lowest, &highest);
-    for (const double removed : {1.0, 1.5, 1.9}) {
-      if (const auto sharp = sharpen(level, removed, noise, allowed_noise * (highest - lowest))) {
-        looks_.push_back(
-            {GreyImage(sharp->image), l, sharp->noise_gain * noise, removed * ImagePyramid::scale(l), BlobSize::small});
-      }
-    }
-  }
 
   /// Ellipses of one look that stand on dark ground and have something like a ring.
   void collect_candidates(std::size_t index) {
@@ -226,7 +109,7 @@ class TargetSearch {
       const auto star = find_star_ellipse(look.grey, start, of_level);
       if (!star) continue;
       const Ellipse full = star->ellipse.scaled(scale, ImagePyramid::from_level(star->ellipse.center, look.level));
-      const double diameter = diameter_of(full);
+      const double diameter = mean_diameter(full);
       if (diameter < 0.8 * config_.min_dot_px || diameter > 1.25 * config_.max_dot_px) continue;
       const double least_light = look.is_sharpened() ? 0.2 : 0.35;
       const RingGlance glance =
@@ -260,7 +143,7 @@ class TargetSearch {
     const DetectedTarget target{decoded.ring.id,
                                 {dot.ellipse.center.x(), dot.ellipse.center.y()},
                                 dot.sigma_px,
-                                diameter_of(dot.ellipse),
+                                mean_diameter(dot.ellipse),
                                 decoded.ring.distance};
     found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit});
     return Rejection::none;
@@ -270,7 +153,7 @@ class TargetSearch {
   /// fit, which it disturbed, has to be mended twice.
   Rejection fit_finely(const Look& look, FittedDot& dot, DecodedDot& decoded) {
     constexpr double small_px = 10.0;
-    const int rounds = diameter_of(dot.ellipse) < small_px ? 3 : 1;
+    const int rounds = mean_diameter(dot.ellipse) < small_px ? 3 : 1;
     for (int round = 0; round < rounds; ++round) {
       const auto fine = fit_at_full_resolution(dot, shading_prior(decoded),
                                                [&](const Eigen::Vector2d& p) { return ring_light(p, dot, decoded); });
@@ -377,7 +260,7 @@ class TargetSearch {
   static constexpr double flaws_before_ring = 0.2;  // while the ring's light is still in it
   static bool is_poor(const FittedDot& dot, double noise, double allowed_flaws) {
     return dot.residual > std::hypot(allowed_flaws * dot.contrast, 2.0 * noise) ||
-           dot.sigma_px > max_sigma_of_diameter * diameter_of(dot.ellipse);
+           dot.sigma_px > max_sigma_of_diameter * mean_diameter(dot.ellipse);
   }
 
   /// Whether dot and ring together are farther from a target's than either may be alone.
@@ -409,7 +292,7 @@ class TargetSearch {
   }
 
   DecodedDot decode(const FittedDot& dot, const Look& look) {
-    const double diameter = diameter_of(dot.ellipse);
+    const double diameter = mean_diameter(dot.ellipse);
     if (diameter < config_.min_dot_px || diameter > config_.max_dot_px) return {Rejection::size, {}, {}};
     const EllipseAxes axes = axes_of(dot.ellipse);
     if (axes.semi_major_px > config_.max_axis_ratio * axes.semi_minor_px) return {Rejection::poor_ellipse, {}, {}};
@@ -428,6 +311,7 @@ class TargetSearch {
       if (!scanned) return {Rejection::outside, {}, {}};
       const double response = scanned->response.front().own;
       set_light(*scanned, Eigen::Vector2d::Zero(), correlated.light / std::max(0.1, response));
+      ring.accepted = ring.accepted && !is_open(*scanned, ring.code);
     }
     if (trace_ != nullptr) trace_->decoded.push_back({dot, *scanned, ring});
     if (!plain) ring.lead = lead_by_size(ring, 2.0 * axes.semi_minor_px, library_.bits);
@@ -439,58 +323,10 @@ class TargetSearch {
   [[nodiscard]] bool is_known(const Ellipse& ellipse) const {
     const double outer = library_.geometry.ring_outer_radius / library_.geometry.dot_radius;
     return std::any_of(found_.begin(), found_.end(),
-                       [&](const Found& f) { return f.ellipse.radius_of(ellipse.center) < outer; });
-  }
-
-  static bool is_clearly_better(const Found& a, const Found& b) {
-    constexpr double larger = 2.0;  // what texture feigns is small
-    return a.target.distance + 0.5 <= b.target.distance ||
-           a.target.dot_diameter_px >= larger * b.target.dot_diameter_px;
-  }
-
-  static bool is_better(const Found& a, const Found& b) {
-    if (a.target.distance != b.target.distance) return a.target.distance < b.target.distance;
-    return a.fit / a.target.dot_diameter_px < b.fit / b.target.dot_diameter_px;
-  }
-
-  /// Where many rings are read in vain some read as a code by chance: the fewer targets there are to so many rings, the
-  /// larger the lead that each must have.
-  void drop_unlikely() {
-    constexpr double expected_to_target = 10.0;
-    constexpr double few_targets = 5.0;
-    const double odds = unread_ / (expected_to_target * (static_cast<double>(found_.size()) + few_targets));
-    const double least_lead = std::log(std::max(1.0, odds));
-    std::erase_if(found_, [&](const Found& f) {
-      if (f.lead >= least_lead) return false;
-      reject(f.ellipse, Rejection::no_code);
-      return true;
-    });
-  }
-
-  /// Of two targets that claim one id the one with fewer bits amiss stays; when neither is better, both go: a wrong id
-  /// costs more than a missing one.
-  std::vector<DetectedTarget> each_id_once() {
-    std::sort(found_.begin(), found_.end(), [](const Found& a, const Found& b) {
-      return a.target.id != b.target.id ? a.target.id < b.target.id : is_better(a, b);
-    });
-    std::vector<DetectedTarget> targets;
-    for (auto first = found_.begin(); first != found_.end();) {
-      const auto next =
-          std::find_if(first, found_.end(), [&](const Found& f) { return f.target.id != first->target.id; });
-      const bool alone = next - first == 1;
-      const bool clear = alone || is_clearly_better(*first, *(first + 1));
-      if (clear) targets.push_back(first->target);
-      if (trace_ != nullptr) {
-        for (auto f = clear ? first + 1 : first; f != next; ++f)
-          trace_->rejected.push_back({f->ellipse, Rejection::id_twice});
-      }
-      first = next;
-    }
-    return targets;
+                       [&](const FoundTarget& f) { return f.ellipse.radius_of(ellipse.center) < outer; });
   }
 
   ImagePyramid pyramid_;
-  std::vector<Look> looks_;
   std::vector<Candidate> candidates_;
   ExaminedPlaces examined_;
   const TargetLibrary& library_;
@@ -498,8 +334,9 @@ class TargetSearch {
   RingCorrelator correlator_;
   const DetectConfig& config_;
   double noise_;
+  std::vector<Look> looks_;
   DetectionTrace* trace_;
-  std::vector<Found> found_;
+  std::vector<FoundTarget> found_;
   int unread_ = 0;  // rings that are none of the library
 };
 

@@ -22,6 +22,11 @@ EllipseAxes axes_of(const Ellipse& ellipse) {
   return {1.0 / std::sqrt(std::max(half_trace - spread, 1e-12)), 1.0 / std::sqrt(half_trace + spread)};
 }
 
+double mean_diameter(const Ellipse& ellipse) {
+  const EllipseAxes axes = axes_of(ellipse);
+  return axes.semi_major_px + axes.semi_minor_px;
+}
+
 Eigen::Matrix2d frame_of(const Ellipse& ellipse) { return square_root(ellipse.shape.inverse()); }
 
 std::optional<Ellipse> fit_ellipse(std::span<const Eigen::Vector2d> points, std::span<const double> weights,

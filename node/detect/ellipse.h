@@ -33,6 +33,9 @@ struct EllipseAxes {
 
 EllipseAxes axes_of(const Ellipse& ellipse);
 
+/// Mean of the two axes.
+double mean_diameter(const Ellipse& ellipse);
+
 /// The symmetric matrix that maps the unit circle to the ellipse about its centre. It does not mirror, so that angles
 /// in the circle run the way they run in the image (clockwise as seen, y being down).
 Eigen::Matrix2d frame_of(const Ellipse& ellipse);

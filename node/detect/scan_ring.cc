@@ -26,14 +26,26 @@ double row_radius(const TargetGeometry& geometry, int row) {
          geometry.dot_radius;
 }
 
+/// Where a target's ground is looked for on either side of its ring, in dot radii.
+constexpr double from_ring = 0.25;
+double inside_radius(const TargetGeometry& geometry) {
+  return geometry.ring_inner_radius / geometry.dot_radius - from_ring;
+}
+double outside_radius(const TargetGeometry& geometry) {
+  return geometry.ring_outer_radius / geometry.dot_radius + from_ring;
+}
+
 struct Columns {
   std::vector<double> means;  // NaN where the ring leaves the image
-  std::vector<double> steps;  // outer rows less inner rows; NaN where the outer ones leave the image
+  std::vector<double> inside;
+  std::vector<double> outside;  // NaN where that is outside the image
+  std::vector<double> steps;    // outer rows less inner rows; NaN where the outer ones leave the image
 };
 
 Columns scan_columns(const GreyImage& level, int l, const FittedDot& dot, int columns, const TargetGeometry& geometry) {
   const Eigen::Vector2d center = ImagePyramid::to_level(dot.ellipse.center, l);
   const Eigen::Matrix2d frame = frame_of(dot.ellipse) / ImagePyramid::scale(l);
+  constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
   Columns scanned;
   for (int i = 0; i < columns; ++i) {
     const double angle = two_pi * (i + 0.5) / columns;
@@ -49,8 +61,13 @@ Columns scan_columns(const GreyImage& level, int l, const FittedDot& dot, int co
       if (row != rows / 2) step += row > rows / 2 ? grey : -grey;
       ++inside;
     }
+    const auto reading_at = [&](double radius) {
+      const Eigen::Vector2d p = center + radius * direction;
+      return level.contains(p) ? (level.at(p) - dot.black) / dot.contrast : nowhere;
+    };
+    scanned.inside.push_back(reading_at(inside_radius(geometry)));
+    scanned.outside.push_back(reading_at(outside_radius(geometry)));
     // At the border of the image the inner rows may still tell.
-    constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
     scanned.means.push_back(inside == 0 ? nowhere : (sum / inside - dot.black) / dot.contrast);
     scanned.steps.push_back(inside < rows ? nowhere : step / (rows / 2) / dot.contrast);
   }
@@ -115,6 +132,8 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
     response.floor += from_dot / rows;
     if (row != rows / 2) response.step += (row > rows / 2 ? from_dot : -from_dot) / (rows / 2);
   }
+  response.inside = normal_cdf(-from_ring / radial_sigma) + normal_cdf((1.0 - inside_radius(geometry)) / radial_sigma);
+  response.outside = normal_cdf(-from_ring / radial_sigma);
   response.own = 0.0;
   response.angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;
   constexpr int steps = 5;
@@ -164,8 +183,10 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
   if (first_column_given) first = static_cast<std::size_t>(*first_column_given % count);
   scan.first_column = static_cast<int>(first);
   scan.columns = seen.means;
+  scan.inside = seen.inside;
+  scan.outside = seen.outside;
   scan.steps = seen.steps;
-  for (auto* row : {&scan.columns, &scan.steps})
+  for (auto* row : {&scan.columns, &scan.inside, &scan.outside, &scan.steps})
     std::rotate(row->begin(), row->begin() + static_cast<std::ptrdiff_t>(first), row->end());
   scan.first_angle = two_pi * static_cast<double>(first) / count;
   for (int bit = 0; bit < bits; ++bit) {
@@ -193,7 +214,8 @@ RingScan turned(const RingScan& scan, int columns) {
   RingScan result = scan;
   const int count = static_cast<int>(scan.columns.size());
   const int by = (columns % count + count) % count;
-  for (auto* row : {&result.columns, &result.steps}) std::rotate(row->begin(), row->begin() + by, row->end());
+  for (auto* row : {&result.columns, &result.inside, &result.outside, &result.steps})
+    std::rotate(row->begin(), row->begin() + by, row->end());
   result.first_column = (scan.first_column + by) % count;
   result.first_angle = two_pi * result.first_column / count;
   for (std::size_t bit = 0; bit < result.reading.size(); ++bit)

@@ -18,6 +18,8 @@ struct BitResponse {
   double radial = 1.0;         ///< share of a white arc's light that the scanned rows see
   double angular_sigma = 0.0;  ///< blur along the ring, in bits
   double step = 0.0;           ///< light of the dot on the outer rows less that on the inner ones
+  double inside = 0.0;         ///< what a white arc, and the dot, show a little inside of the ring
+  double outside = 0.0;        ///< what a white arc shows a little outside of the ring
   double light = 1.0;          ///< light at the bit in units of that at the dot's centre
 
   [[nodiscard]] double reading(int before, int bit, int after) const {
@@ -38,6 +40,8 @@ struct RingScan {
   double first_angle = 0.0;            ///< where the first bit begins, in the frame of the dot
   double noise = 0.0;                  ///< standard deviation of a reading from the noise of the image
   std::vector<double> columns;         ///< mean reading of each column from the first bit's beginning on
+  std::vector<double> inside;          ///< reading of each column a little inside of the ring
+  std::vector<double> outside;         ///< reading of each column a little outside of the ring
   std::vector<double> steps;           ///< by how much each column is brighter in its outer rows than in its inner ones
   double deviation = 0.0;              ///< mean deviation within the bits at the rotation taken, [A] 2.3.5
 };
