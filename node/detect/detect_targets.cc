@@ -71,7 +71,6 @@ class TargetSearch {
       if (is_known(candidate.full) || examined_.has_like(candidate.full, look.rank())) continue;
       examined_.add(candidate.full, look.rank());
       const Rejection rejection = examine(look, candidate.star);
-      if (rejection == Rejection::no_code) ++unread_;
       if (rejection != Rejection::none) reject(candidate.full, rejection);
     }
     return choose_targets(std::move(found_), unread_, trace_);
@@ -137,6 +136,7 @@ class TargetSearch {
     if (is_poor(*rough, look.noise, flaws_before_ring)) return Rejection::poor_ellipse;
     FittedDot dot = look.is_sharpened() ? from_level(*rough, look.level) : at_full_resolution(*rough, look.level);
     DecodedDot decoded = decode(dot, look);
+    if (decoded.rejection == Rejection::no_code) count_unread(decoded.ring);
     if (decoded.rejection != Rejection::none) return decoded.rejection;
     const Rejection rejection = look.is_sharpened() ? fit_blurred(look, dot, decoded) : fit_finely(look, dot, decoded);
     if (rejection != Rejection::none) return rejection;
@@ -145,8 +145,14 @@ class TargetSearch {
                                 dot.sigma_px,
                                 mean_diameter(dot.ellipse),
                                 decoded.ring.distance};
-    found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit});
+    found_.push_back({target, dot.ellipse, decoded.ring.lead, decoded.ring.fit, decoded.ring.covered > 0.0});
     return Rejection::none;
+  }
+
+  void count_unread(const DecodedRing& ring) {
+    constexpr double most_cost = 18.0;  // nats
+    ++unread_.all;
+    if (ring.cost > 0.0 && ring.cost < most_cost) ++unread_.like_codes;
   }
 
   /// Now that the code is known, the ring's light can be taken off; in small dots it reaches the window, and the first
@@ -337,7 +343,7 @@ class TargetSearch {
   std::vector<Look> looks_;
   DetectionTrace* trace_;
   std::vector<FoundTarget> found_;
-  int unread_ = 0;  // rings that are none of the library
+  UnreadRings unread_;
 };
 
 }  // namespace

@@ -20,13 +20,16 @@ bool is_better(const FoundTarget& a, const FoundTarget& b) {
   return a.fit / a.target.dot_diameter_px < b.fit / b.target.dot_diameter_px;
 }
 
-void drop_unlikely(std::vector<FoundTarget>& found, int unread, DetectionTrace* trace) {
+void drop_unlikely(std::vector<FoundTarget>& found, const UnreadRings& unread, DetectionTrace* trace) {
   constexpr double expected_to_target = 10.0;
   constexpr double few_targets = 5.0;
-  const double odds = unread / (expected_to_target * (static_cast<double>(found.size()) + few_targets));
+  const double odds = unread.all / (expected_to_target * (static_cast<double>(found.size()) + few_targets));
   const double least_lead = std::log(std::max(1.0, odds));
+  constexpr double all_unread = 2.0;  // nats
+  const double lead_of_covered =
+      all_unread * unread.like_codes / std::max(1.0, static_cast<double>(found.size()) + unread.like_codes);
   std::erase_if(found, [&](const FoundTarget& f) {
-    if (f.lead >= least_lead) return false;
+    if (f.lead >= least_lead + (f.covered ? lead_of_covered : 0.0)) return false;
     note(trace, f, Rejection::no_code);
     return true;
   });
@@ -34,7 +37,8 @@ void drop_unlikely(std::vector<FoundTarget>& found, int unread, DetectionTrace* 
 
 }  // namespace
 
-std::vector<DetectedTarget> choose_targets(std::vector<FoundTarget> found, int unread, DetectionTrace* trace) {
+std::vector<DetectedTarget> choose_targets(std::vector<FoundTarget> found, const UnreadRings& unread,
+                                           DetectionTrace* trace) {
   drop_unlikely(found, unread, trace);
   std::sort(found.begin(), found.end(), [](const FoundTarget& a, const FoundTarget& b) {
     return a.target.id != b.target.id ? a.target.id < b.target.id : is_better(a, b);
