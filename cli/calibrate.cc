@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CalibrateOptions {
-  fs::path library, field, out;
+  fs::path library, field, dots, out;
   std::string id;
   double pixel_pitch_um = 0.0, focal_length_mm = 0.0;
   bool export_yaml = false;
@@ -99,6 +99,7 @@ nlohmann::json describe(const Calibration& calibration, const std::vector<Calibr
                       {"tangential", d.tangential},
                       {"affine", d.affine}}}};
   json["reprojection_rms_px"] = calibration.reprojection_rms_px;
+  json["target_sigma_mm"] = calibration.target_sigma_mm;
   json["observations"] = calibration.observations;
   for (int i = 0; i < kInteriorTerms; ++i)
     json["ci95"][std::string(kInteriorNames[static_cast<std::size_t>(i)])] = calibration.ci95(i);
@@ -133,6 +134,9 @@ void print(const Calibration& calibration, const std::vector<CalibrationImage>& 
       fmt::print("  {:<22} {:>13.4e} +- {:.1e}\n", kInteriorNames[i], value, half_width);
     }
   }
+  if (calibration.target_sigma_mm > 0.0)
+    fmt::print("  targets are seen {:.4f} mm (sigma, a coordinate) off the field's coordinates, alike in all images\n",
+               calibration.target_sigma_mm);
   for (std::size_t i = 0; i < images.size(); ++i) {
     const auto [rms, used] = image_fit(calibration, i);
     fmt::print("  {}: {} targets, RMS {:.4f} px\n", images[i].name, used, rms);
@@ -147,9 +151,10 @@ void print(const Calibration& calibration, const std::vector<CalibrationImage>& 
 // What a reader of the camera does not need but an auditor asks for.
 std::string calibration_record(const Calibration& calibration, std::size_t images, const std::string& made_at) {
   std::string text = fmt::format(
-      "[calibration]\ndate = {}\nreprojection_rms_px = {:.5f}\nobservations = {}\nimages = {}\n"
+      "[calibration]\ndate = {}\nreprojection_rms_px = {:.5f}\ntarget_sigma_mm = {:.6f}\nobservations = {}\nimages = "
+      "{}\n"
       "[calibration.ci95]\n",
-      made_at, calibration.reprojection_rms_px, calibration.observations, images);
+      made_at, calibration.reprojection_rms_px, calibration.target_sigma_mm, calibration.observations, images);
   for (int i = 0; i < kInteriorTerms; ++i)
     text += fmt::format("{} = {:.6e}\n", kInteriorNames[static_cast<std::size_t>(i)], calibration.ci95(i));
   return text;
@@ -189,9 +194,11 @@ int run_calibrate(const CalibrateOptions& options, bool as_json) {
   if (!library) return fail(library.error());
   const auto field = read_target_field(options.field);
   if (!field) return fail(field.error());
+  const auto dots = options.dots.empty() ? Result<DotDiscs>{} : read_dot_discs(options.dots);
+  if (!dots) return fail(dots.error());
   const auto loaded = load(options, *library, *field);
   if (!loaded) return fail(loaded.error());
-  const auto calibration = calibrate_camera(loaded->camera, loaded->images, *field, CalibrateConfig{});
+  const auto calibration = calibrate_camera(loaded->camera, loaded->images, *field, CalibrateConfig{}, *dots);
   if (!calibration) return fail(calibration.error());
   for (const std::string& warning : calibration->warnings) std::cerr << "imprint: warning: " << warning << '\n';
   const std::string made_at = utc_text(wall_clock_ns());
@@ -218,6 +225,7 @@ void add_calibrate_command(Cli& cli) {
                               [options, &cli] { return run_calibrate(*options, cli.json); });
   command->add_option("--library", options->library, "library.json, the coded targets")->required();
   command->add_option("--field", options->field, "field.csv, where they stand")->required();
+  command->add_option("--dots", options->dots, "dots.csv, size and normal of the dots, as `survey --dots` writes it");
   command->add_option("--pixel-pitch-um", options->pixel_pitch_um, "side of a pixel")->required();
   command->add_option("--focal-length-mm", options->focal_length_mm, "as engraved on the lens")->required();
   command->add_option("--id", options->id, "name of the camera, part of its keys on the network")->required();

@@ -210,6 +210,9 @@ void write_constants(TextColumn& column, const CalibrationSheet& sheet) {
                          camera.height_px, camera.pixel_pitch_um, sheet.field_name));
   column.add(fmt::format("Reprojection RMS {:.4f} px over {} targets in {} images", calibration.reprojection_rms_px,
                          calibration.observations, sheet.images.size()));
+  if (calibration.target_sigma_mm > 0.0)
+    column.add(fmt::format("Targets off the field by {:.4f} mm a coordinate, alike in all images (sigma)",
+                           calibration.target_sigma_mm));
   column.skip();
   for (std::size_t i = 0; i < kInteriorNames.size(); ++i) {
     const double value = constant(camera, i), half_width = calibration.ci95(static_cast<int>(i));

@@ -12,7 +12,7 @@ namespace imprint {
 namespace {
 
 struct ResectOptions {
-  std::filesystem::path camera, library, field, image;
+  std::filesystem::path camera, library, field, dots, image;
 };
 
 nlohmann::json describe(const std::string& camera, const Resection& resection) {
@@ -57,6 +57,8 @@ int run_resect(const ResectOptions& options, bool as_json) {
   if (!library) return fail(library.error());
   const auto field = read_target_field(options.field);
   if (!field) return fail(field.error());
+  const auto dots = options.dots.empty() ? Result<DotDiscs>{} : read_dot_discs(options.dots);
+  if (!dots) return fail(dots.error());
   const auto frame = read_image(options.image, &warnings);
   if (!frame) return fail(frame.error());
   for (const std::string& warning : warnings) std::cerr << "imprint: warning: " << warning << '\n';
@@ -67,7 +69,7 @@ int run_resect(const ResectOptions& options, bool as_json) {
                                                options.camera.string(), camera->width_px, camera->height_px)});
   }
   const auto resection =
-      resect(*camera, detect_targets(frame->image, *library, DetectConfig{}), *field, ResectConfig{});
+      resect(*camera, detect_targets(frame->image, *library, DetectConfig{}), *field, ResectConfig{}, *dots);
   if (!resection)
     return fail({resection.error().kind, fmt::format("{}: {}", options.image.string(), resection.error().message)});
   for (const int id : resection->unknown_ids) {
@@ -88,6 +90,7 @@ void add_resect_command(Cli& cli) {
   command->add_option("--camera", options->camera, "camN.toml, the calibration")->required();
   command->add_option("--library", options->library, "library.json, the coded targets")->required();
   command->add_option("--field", options->field, "field.csv, where they stand")->required();
+  command->add_option("--dots", options->dots, "dots.csv, size and normal of the dots, as `survey --dots` writes it");
   command->add_option("image", options->image, "PNG or TIFF")->required();
 }
 

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SurveyOptions {
-  fs::path library, bars, out, camera, camera_out, align;
+  fs::path library, bars, out, dots, camera, camera_out, align;
   double focal_length_mm = 0.0, pixel_pitch_um = 0.0;
   std::optional<int> origin, x_axis, plane;
   bool without_bar_targets = false;
@@ -196,6 +196,11 @@ int run_survey(const SurveyOptions& options, bool as_json) {
       return fail({ErrorKind::job_failed, "survey: only the targets of the scale bars are measured"});
   }
   if (auto written = write_target_field(field, options.out); !written) return fail(written.error());
+  if (!options.dots.empty()) {
+    DotDiscs dots = survey->dots;
+    std::erase_if(dots, [&](const auto& dot) { return field.targets.count(dot.first) == 0; });
+    if (auto written = write_dot_discs(dots, options.dots); !written) return fail(written.error());
+  }
   if (!options.camera_out.empty()) {
     if (auto written = write_camera_file(survey->camera, options.camera_out); !written) return fail(written.error());
   }
@@ -213,6 +218,7 @@ void add_survey_command(Cli& cli) {
   command->add_option("--library", options->library, "library.json, the coded targets")->required();
   command->add_option("--scale-bars", options->bars, "bars.csv: id_a,id_b,length_mm,sigma_mm")->required();
   command->add_option("--out", options->out, "field.csv to write")->required();
+  command->add_option("--dots", options->dots, "write size and normal of the dots: dots.csv of rig.toml and resect");
   auto* camera =
       command->add_option("--camera", options->camera, "camN.toml to start from; it is adjusted all the same");
   command->add_option("--focal-length-mm", options->focal_length_mm, "as engraved on the lens; found if not given")

@@ -77,7 +77,7 @@ DetectConfig of_rig_targets() {
 Result<Resection> resect_in_hot_air(const CameraModel& camera, const Rig& rig, Result<Resection> first,
                                     const std::vector<DetectedTarget>& targets, const Segmentation& forging) {
   if (!first || rig.forging.polarity != Polarity::bright) return first;
-  auto again = resect(camera, weigh_hot_air(targets, forging, HotAirConfig{}), rig.field, ResectConfig{});
+  auto again = resect(camera, weigh_hot_air(targets, forging, HotAirConfig{}), rig.field, ResectConfig{}, rig.dots);
   return again ? std::move(again) : std::move(first);
 }
 
@@ -110,7 +110,8 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
   result.targets = timed(result, "detect", [&] { return detect_targets(frame.image, rig.library, of_rig_targets()); });
   imprint.quality.targets_seen = static_cast<int>(result.targets.size());
 
-  auto resection = timed(result, "resect", [&] { return resect(camera, result.targets, rig.field, ResectConfig{}); });
+  auto resection =
+      timed(result, "resect", [&] { return resect(camera, result.targets, rig.field, ResectConfig{}, rig.dots); });
   const auto kept = keeper != nullptr ? keeper->kept() : std::nullopt;
   if (resection) {
     imprint.pose = resection->pose;

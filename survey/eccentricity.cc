@@ -147,7 +147,7 @@ std::optional<DotDisc> find_disc(const Network& network, const std::vector<const
 
 }  // namespace
 
-std::map<int, DotDisc> find_dot_discs(const Network& network, const std::vector<Sight>& sights) {
+DotDiscs find_dot_discs(const Network& network, const std::vector<Sight>& sights) {
   std::map<int, std::vector<const Sight*>> of_target;
   for (const Sight& sight : sights)
     if (sight.used && sight.dot_diameter_px > 0.0 && network.holds(sight)) of_target[sight.id].push_back(&sight);
@@ -169,7 +169,7 @@ std::map<int, DotDisc> find_dot_discs(const Network& network, const std::vector<
   }
   if (log_radii.empty()) return {};
   const double common = median(log_radii);
-  std::map<int, DotDisc> discs;
+  DotDiscs discs;
   for (const auto& [id, seen] : of_target) {
     // A dot of quite another size is of another print run and stands for itself.
     const bool another = std::abs(rough[id] - common) > 0.25;
@@ -178,32 +178,6 @@ std::map<int, DotDisc> find_dot_discs(const Network& network, const std::vector<
     if (disc) discs[id] = *disc;
   }
   return discs;
-}
-
-ObservedPoint eccentricity_px(const CameraModel& camera, const CameraPose& pose, const Eigen::Vector3d& p_world,
-                              const DotDisc& disc) {
-  constexpr int kCorners = 64;  // of a polygon on the outline; its centroid is the ellipse's, affinely
-  const Eigen::Vector3d side = disc.normal.unitOrthogonal(), up = disc.normal.cross(side);
-  const auto seen = [&](const Eigen::Vector3d& p) {
-    const ObservedPoint at = project(camera, pose.cam_from_world(p));
-    return Eigen::Vector2d(at.x_px, at.y_px);
-  };
-  const Eigen::Vector2d centre = seen(p_world);
-  const auto corner = [&](int i) {
-    const double a = 2.0 * std::numbers::pi * i / kCorners;
-    return Eigen::Vector2d(seen(p_world + disc.radius * (std::cos(a) * side + std::sin(a) * up)) - centre);
-  };
-  double area = 0.0;
-  Eigen::Vector2d moment = Eigen::Vector2d::Zero(), from = corner(0);
-  for (int i = 1; i <= kCorners; ++i) {
-    const Eigen::Vector2d to = corner(i % kCorners);
-    const double cross = from.x() * to.y() - from.y() * to.x();
-    area += 0.5 * cross;
-    moment += cross * (from + to) / 6.0;
-    from = to;
-  }
-  if (!(std::abs(area) > 1e-9)) return {};
-  return {moment.x() / area, moment.y() / area};
 }
 
 void correct_eccentricity(const Network& network, std::vector<Sight>& sights) {

@@ -324,6 +324,7 @@ class Surveyor {
       survey_.warnings.push_back(fmt::format(
           "{} of {} sights were left out: check the photographs for blur, and the targets for having been moved",
           survey_.rejected.size(), survey_.rejected.size() + static_cast<std::size_t>(survey_.observations)));
+    survey_.dots = find_dot_discs(network_, sights_);
     survey_.sights = std::move(sights_);
   }
 

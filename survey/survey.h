@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "lib/camera/camera_model.h"
+#include "lib/camera/dot_disc.h"
 #include "lib/result/result.h"
 #include "lib/targets/target_field.h"
 #include "survey/bundle.h"
@@ -69,6 +70,7 @@ struct Survey {
   CameraModel camera;
   InteriorMatrix interior_covariance = InteriorMatrix::Zero();
   std::map<int, SurveyTarget> targets;
+  DotDiscs dots;  ///< of the targets that four or more photographs show; in the frame of `targets`
   std::vector<SurveyBar> bars;
   std::vector<std::optional<CameraPose>> poses;  ///< by photograph; none where it could not be used
   std::vector<Sight> sights;

@@ -11,7 +11,8 @@
 
 #include "lib/adjust/calibration_review.h"
 #include "lib/adjust/collinearity_error.h"
-#include "lib/camera/balanced_distortion.h"
+#include "lib/adjust/own_focal_length.h"
+#include "lib/adjust/variance_components.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
@@ -28,17 +29,25 @@ struct FieldError {
   }
 };
 
-struct OwnFocalLength {
+struct ImageFocalLength : OwnFocalLength {
   std::size_t image = 0;
-  double value_px = 0.0, sigma_px = 0.0;
 };
 
 struct Observation {
   std::size_t image = 0;
   PointObservation point;
   double sigma_px = 0.0;
+  ObservedPoint eccentricity_px{};  // of the dot's image, where its disc is known
   bool used = true;
   Eigen::Vector2d residual_px = Eigen::Vector2d::Zero();
+
+  [[nodiscard]] CollinearityError error(const CameraModel& camera, double sigma) const {
+    return {{point.at.x_px - eccentricity_px.x_px, point.at.y_px - eccentricity_px.y_px},
+            sigma,
+            camera.normalizer_px(),
+            camera.distortion.r0};
+  }
+  [[nodiscard]] CollinearityError error(const CameraModel& camera) const { return error(camera, sigma_px); }
 };
 
 double median(std::vector<double>& values) {
@@ -50,8 +59,8 @@ double median(std::vector<double>& values) {
 class Adjustment {
  public:
   Adjustment(const CameraModel& start, const std::vector<CalibrationImage>& images, const TargetField& field,
-             const CalibrateConfig& config)
-      : start_(start), images_(images), field_(field), config_(config) {
+             const DotDiscs& dots, const CalibrateConfig& config)
+      : start_(start), images_(images), field_(field), dots_(dots), config_(config) {
     interior_ = {start.focal_length_px, start.principal_point.x_px, start.principal_point.y_px};
     for (const CalibrationImage& image : images) {
       std::array<double, 3> turn{}, center{};
@@ -77,9 +86,14 @@ class Adjustment {
     // Robust first; then least squares over what fits, until it is the same targets.
     if (auto solved = solve(true); !solved) return pass_on(solved.error());
     if (auto one = check_one_camera(); !one) return pass_on(one.error());
+    correct_eccentricity();
     for (int round = 0; round < 6 && choose(); ++round)
       if (auto solved = solve(false); !solved) return pass_on(solved.error());
     if (auto plausible = check(); !plausible) return pass_on(plausible.error());
+    if (auto enough = check_redundancy(); !enough) return pass_on(enough.error());
+    correct_eccentricity();
+    weigh();
+    if (auto solved = solve(false); !solved) return pass_on(solved.error());
     return describe();
   }
 
@@ -90,7 +104,7 @@ class Adjustment {
     for (Observation& o : observations_) {
       if (!robust && !o.used) continue;
       auto* cost = new ceres::AutoDiffCostFunction<CollinearityError, 2, kInteriorTerms, 3, 3, 3>(
-          new CollinearityError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
+          new CollinearityError(o.error(start_)));
       // Far below what a wrong id does and well above what a start value is off.
       auto* loss = robust ? new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px)) : nullptr;
       problem_->AddResidualBlock(cost, loss, interior_.data(), turns_[o.image].data(), centers_[o.image].data(),
@@ -99,7 +113,7 @@ class Adjustment {
     for (auto& [id, point] : points_) {
       if (!problem_->HasParameterBlock(point.data())) continue;
       const FieldTarget& target = field_.targets.at(id);
-      if (const double sigma = target.sigma_mm.value_or(0.0); sigma > 0.0) {
+      if (const double sigma = std::hypot(target.sigma_mm.value_or(0.0), components_.target_sigma_mm); sigma > 0.0) {
         problem_->AddResidualBlock(
             new ceres::AutoDiffCostFunction<FieldError, 3, 3>(new FieldError{target.p_world_mm, sigma}), nullptr,
             point.data());
@@ -123,11 +137,70 @@ class Adjustment {
 
   void find_residuals() {
     for (Observation& o : observations_) {
-      const CollinearityError error{o.point.at, 1.0, start_.normalizer_px(), start_.distortion.r0};
+      const CollinearityError error = o.error(start_, 1.0);
       if (!error(interior_.data(), turns_[o.image].data(), centers_[o.image].data(), points_[o.point.id].data(),
                  o.residual_px.data()))
         o.residual_px.setConstant(1e6);  // behind the camera
     }
+  }
+
+  CameraPose pose_of(std::size_t image) const {
+    CameraPose pose;
+    pose.R_cam_world = rotation_from_vector(Eigen::Vector3d::Map(turns_[image].data()));
+    pose.center_world_mm = Eigen::Vector3d::Map(centers_[image].data());
+    return pose;
+  }
+
+  CameraModel camera() const {
+    CameraModel camera = start_;
+    camera.focal_length_px = interior_[0];
+    camera.principal_point = {interior_[1], interior_[2]};
+    std::copy_n(interior_.data() + 3, 3, camera.distortion.radial.begin());
+    std::copy_n(interior_.data() + 6, 2, camera.distortion.tangential.begin());
+    std::copy_n(interior_.data() + 8, 2, camera.distortion.affine.begin());
+    return camera;
+  }
+
+  // The centre of a dot's image is not the image of its centre.
+  void correct_eccentricity() {
+    const CameraModel found = camera();
+    for (Observation& o : observations_) {
+      const auto disc = dots_.find(o.point.id);
+      if (disc == dots_.end()) continue;
+      const CameraPose pose = pose_of(o.image);
+      const Eigen::Vector3d p_world = Eigen::Vector3d::Map(points_[o.point.id].data());
+      if (pose.cam_from_world(p_world).z() > 2.0 * disc->second.radius)
+        o.eccentricity_px = eccentricity_px(found, pose, p_world, disc->second);
+    }
+  }
+
+  // Gives noise and targets the variances that the residuals show.
+  void weigh() {
+    const auto shared = static_cast<Eigen::Index>(kInteriorTerms + 6 * images_.size());
+    std::vector<LinearSight> sights;
+    std::map<int, double> stated_sigma_mm;
+    for (Observation& o : observations_) {
+      if (!o.used) continue;
+      const FieldTarget& target = field_.targets.at(o.point.id);
+      stated_sigma_mm[o.point.id] = target.sigma_mm.value_or(0.0);
+      const ceres::AutoDiffCostFunction<CollinearityError, 2, kInteriorTerms, 3, 3, 3> cost(
+          new CollinearityError(o.error(start_)));
+      LinearSight sight{o.point.id, {}, Eigen::Matrix<double, 2, Eigen::Dynamic>::Zero(2, shared), {}};
+      Eigen::Matrix<double, 2, kInteriorTerms, Eigen::RowMajor> by_interior;
+      Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_turn, by_center, by_target;
+      const std::array<const double*, 4> at{interior_.data(), turns_[o.image].data(), centers_[o.image].data(),
+                                            target.p_world_mm.data()};
+      std::array<double*, 4> slopes{by_interior.data(), by_turn.data(), by_center.data(), by_target.data()};
+      if (!cost.Evaluate(at.data(), sight.residual.data(), slopes.data())) continue;
+      const auto first = static_cast<Eigen::Index>(kInteriorTerms + 6 * o.image);
+      sight.by_shared.leftCols<kInteriorTerms>() = by_interior;
+      sight.by_shared.middleCols<3>(first) = by_turn;
+      sight.by_shared.middleCols<3>(first + 3) = by_center;
+      sight.by_target = by_target;
+      sights.push_back(std::move(sight));
+    }
+    components_ = find_variance_components(sights, stated_sigma_mm);
+    for (Observation& o : observations_) o.sigma_px *= components_.noise;
   }
 
   // Which targets fit; whether that has changed.
@@ -149,49 +222,17 @@ class Adjustment {
     return changed;
   }
 
-  // The focal length that one image shows by itself, the other constants given; nothing where it cannot tell.
-  std::optional<OwnFocalLength> own_focal_length(std::size_t image) {
-    std::array<double, kInteriorTerms> interior = interior_;
-    std::array<double, 3> turn = turns_[image], center = centers_[image];
-    ceres::Problem problem;
-    int count = 0;
-    for (const Observation& o : observations_) {
-      if (o.image != image) continue;
-      auto* cost = new ceres::AutoDiffCostFunction<CollinearityError, 2, kInteriorTerms, 3, 3, 3>(
-          new CollinearityError{o.point.at, o.sigma_px, start_.normalizer_px(), start_.distortion.r0});
-      auto* loss = new ceres::CauchyLoss(std::max(3.0, 0.3 / o.sigma_px));
-      double* point = points_[o.point.id].data();
-      problem.AddResidualBlock(cost, loss, interior.data(), turn.data(), center.data(), point);
-      problem.SetParameterBlockConstant(point);
-      ++count;
-    }
-    problem.SetManifold(interior.data(), new ceres::SubsetManifold(kInteriorTerms, {1, 2, 3, 4, 5, 6, 7, 8, 9}));
-    ceres::Solver::Options how;
-    how.max_num_iterations = 100;
-    how.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(how, &problem, &summary);
-    ceres::Covariance::Options exact;
-    exact.algorithm_type = ceres::DENSE_SVD;
-    exact.min_reciprocal_condition_number = 1e-20;
-    ceres::Covariance covariance(exact);
-    const std::vector<std::pair<const double*, const double*>> wanted{{interior.data(), interior.data()}};
-    const int freedom = 2 * count - 7;
-    double variance = 0.0;
-    if (!summary.IsSolutionUsable() || freedom < 5 || !covariance.Compute(wanted, &problem) ||
-        !covariance.GetCovarianceBlockInTangentSpace(interior.data(), interior.data(), &variance))
-      return std::nullopt;
-    const double scale = std::max(1.0, 2.0 * summary.final_cost / freedom);
-    return OwnFocalLength{image, interior[0], std::sqrt(variance * scale)};
-  }
-
   // Two lenses, or two settings of one, in the same set: each image's own focal length tells.
   Result<void> check_one_camera() {
-    std::vector<OwnFocalLength> own;
-    for (std::size_t i = 0; i < images_.size(); ++i)
-      if (const auto found = own_focal_length(i)) own.push_back(*found);
+    std::vector<ImageFocalLength> own;
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      std::vector<CentreSeen> centres;
+      for (const Observation& o : observations_)
+        if (o.image == i) centres.push_back({o.error(start_), points_[o.point.id]});
+      if (const auto found = own_focal_length(interior_, turns_[i], centers_[i], centres)) own.push_back({*found, i});
+    }
     if (own.size() < 2) return {};
-    std::ranges::sort(own, {}, &OwnFocalLength::value_px);
+    std::ranges::sort(own, {}, &ImageFocalLength::value_px);
     std::size_t split = 0;
     double widest = 0.0;
     for (std::size_t i = 0; i + 1 < own.size(); ++i) {
@@ -202,11 +243,11 @@ class Adjustment {
     }
     if (widest == 0.0) return {};
     const auto describe_side = [&](auto begin, auto end) {
-      std::vector<OwnFocalLength> side(begin, end);
-      std::ranges::sort(side, {}, &OwnFocalLength::image);
+      std::vector<ImageFocalLength> side(begin, end);
+      std::ranges::sort(side, {}, &ImageFocalLength::image);
       std::vector<std::string> names;
       double sum = 0.0;
-      for (const OwnFocalLength& one : side) names.push_back(images_[one.image].name), sum += one.value_px;
+      for (const ImageFocalLength& one : side) names.push_back(images_[one.image].name), sum += one.value_px;
       return fmt::format("{:.1f} px ({})", sum / static_cast<double>(side.size()), fmt::join(names, ", "));
     };
     const auto middle = own.begin() + static_cast<std::ptrdiff_t>(split);
@@ -235,33 +276,26 @@ class Adjustment {
     return {};
   }
 
+  Result<void> check_redundancy() const {
+    const auto used = static_cast<int>(std::ranges::count_if(observations_, &Observation::used));
+    if (2 * used - kInteriorTerms - 6 * static_cast<int>(images_.size()) >= 1) return {};
+    return invalid_input("calibration: {} targets in {} images do not determine a camera; take more images", used,
+                         images_.size());
+  }
+
   Result<Calibration> describe() {
     Calibration result;
-    CameraModel& camera = result.camera = start_;
-    camera.focal_length_px = interior_[0];
-    camera.principal_point = {interior_[1], interior_[2]};
-    std::copy_n(interior_.data() + 3, 3, camera.distortion.radial.begin());
-    std::copy_n(interior_.data() + 6, 2, camera.distortion.tangential.begin());
-    std::copy_n(interior_.data() + 8, 2, camera.distortion.affine.begin());
-    double squares = 0.0, weighted = 0.0;
+    result.camera = camera();
+    result.target_sigma_mm = components_.target_sigma_mm;
+    double squares = 0.0;
     for (const Observation& o : observations_) {
       result.residuals.push_back({o.image, o.point.id, o.point.at, o.residual_px.x(), o.residual_px.y(), o.used});
       if (!o.used) continue;
       squares += o.residual_px.squaredNorm();
-      weighted += (o.residual_px / o.sigma_px).squaredNorm();
       ++result.observations;
     }
     result.reprojection_rms_px = std::sqrt(squares / result.observations);
-    for (std::size_t i = 0; i < images_.size(); ++i) {
-      CameraPose pose;
-      pose.R_cam_world = rotation_from_vector(Eigen::Vector3d::Map(turns_[i].data()));
-      pose.center_world_mm = Eigen::Vector3d::Map(centers_[i].data());
-      result.poses.push_back(pose);
-    }
-    const int freedom = 2 * result.observations - kInteriorTerms - 6 * static_cast<int>(images_.size());
-    if (freedom < 1)
-      return invalid_input("calibration: {} targets in {} images do not determine a camera; take more images",
-                           result.observations, images_.size());
+    for (std::size_t i = 0; i < images_.size(); ++i) result.poses.push_back(pose_of(i));
     ceres::Covariance::Options how;
     how.algorithm_type = ceres::SPARSE_QR;
     ceres::Covariance covariance(how);
@@ -273,7 +307,7 @@ class Adjustment {
           "calibration: the images leave {} open; take some with the camera rolled by 90 deg and the "
           "field seen aslant",
           "the camera's constants");
-    result.covariance = block * weighted / freedom;
+    result.covariance = block;  // the variances are those that the residuals show
     result.unknown = unknown_;
     result.warnings = separation_warnings(result, images_, field_, config_);
     return result;
@@ -282,7 +316,9 @@ class Adjustment {
   CameraModel start_;
   const std::vector<CalibrationImage>& images_;
   const TargetField& field_;
+  const DotDiscs& dots_;
   CalibrateConfig config_;
+  VarianceComponents components_;
   std::array<double, kInteriorTerms> interior_{};
   std::vector<std::array<double, 3>> turns_, centers_;
   std::map<int, std::array<double, 3>> points_;
@@ -304,7 +340,7 @@ Result<void> CalibrateConfig::validate() const {
 }
 
 Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector<CalibrationImage>& images,
-                                     const TargetField& field, const CalibrateConfig& config) {
+                                     const TargetField& field, const CalibrateConfig& config, const DotDiscs& dots) {
   if (images.empty()) return invalid_input("calibration: expected images, found none");
   for (const CalibrationImage& image : images) {
     const auto known = std::count_if(image.points.begin(), image.points.end(),
@@ -316,7 +352,7 @@ Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector
   constexpr double kOnALine = 0.02;
   if (field_extents(images, field)[1] < kOnALine)
     return invalid_input("calibration: the targets seen stand on one line; spread them over the image and in depth");
-  return Adjustment(start, images, field, config).run();
+  return Adjustment(start, images, field, dots, config).run();
 }
 
 }  // namespace imprint

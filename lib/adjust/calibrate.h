@@ -10,6 +10,7 @@
 
 #include "lib/camera/camera_model.h"
 #include "lib/camera/camera_pose.h"
+#include "lib/camera/dot_disc.h"
 #include "lib/result/result.h"
 #include "lib/targets/target_field.h"
 
@@ -68,12 +69,13 @@ struct UnknownTarget {
 
 struct Calibration {
   CameraModel camera;
-  InteriorMatrix covariance = InteriorMatrix::Zero();  ///< of kInteriorNames, scaled by the residuals found
+  InteriorMatrix covariance = InteriorMatrix::Zero();  ///< of kInteriorNames, with the variances the residuals show
   std::vector<CameraPose> poses;                       ///< one an image
   std::vector<CalibrationResidual> residuals;          ///< of every target that the field knows
   std::vector<UnknownTarget> unknown;                  ///< seen, but not in the field
   double reprojection_rms_px = 0.0;                    ///< root mean square of the residual's length, used targets
-  int observations = 0;                                ///< used targets over all images
+  double target_sigma_mm = 0.0;  ///< found: of each coordinate of a target, beyond the sigma that the field states
+  int observations = 0;          ///< used targets over all images
   std::vector<std::string> warnings;
 
   [[nodiscard]] double ci95(int term) const { return 1.96 * std::sqrt(std::max(0.0, covariance(term, term))); }
@@ -81,10 +83,12 @@ struct Calibration {
 
 /// Interior orientation from several images of a known field at once, [B] 2.3 equations 1 to 5: least squares on the
 /// reprojection error over the camera's ten constants, one pose an image and, where the field states a sigma, the
-/// targets' coordinates. Robust first, then least squares over the targets that fit.
+/// targets' coordinates. Robust first, then least squares over the targets that fit, each target with what it is off in
+/// all images alike (variance_components.h). `dots`: where known, the eccentricity of a dot's image is taken out.
 /// `start`: image size, pixel pitch, nominal focal length and principal point. Fails (invalid_input) when an image does
 /// not belong to the others or to the camera stated, or when the images leave a constant open; says which.
 Result<Calibration> calibrate_camera(const CameraModel& start, const std::vector<CalibrationImage>& images,
-                                     const TargetField& field, const CalibrateConfig& config);
+                                     const TargetField& field, const CalibrateConfig& config,
+                                     const DotDiscs& dots = {});
 
 }  // namespace imprint

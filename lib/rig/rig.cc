@@ -76,6 +76,7 @@ Result<Rig> read_rig(const std::filesystem::path& path) {
   TomlReader read(path, *table);
   const auto field_path = read.path("field");
   const auto library_path = read.path("library");
+  const auto dots_path = read.path("dots", std::filesystem::path{});
   Rig rig;
   rig.forging = read_forging(read);
   auto cameras = read_cameras(path, read, rig.warnings);
@@ -85,6 +86,11 @@ Result<Rig> read_rig(const std::filesystem::path& path) {
   auto field = read_target_field(field_path);
   if (!field) return pass_on(field.error());
   rig.field = std::move(*field);
+  if (!dots_path.empty()) {
+    auto dots = read_dot_discs(dots_path);
+    if (!dots) return pass_on(dots.error());
+    rig.dots = std::move(*dots);
+  }
   auto library = read_target_library(library_path);
   if (!library) return pass_on(library.error());
   rig.library = std::move(*library);

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "lib/camera/camera_model.h"
+#include "lib/camera/dot_disc.h"
 #include "lib/result/result.h"
 #include "lib/targets/target_field.h"
 #include "lib/targets/target_library.h"
@@ -28,6 +29,7 @@ struct ForgingSpec {
 /// `rig.toml` with all that it names, read.
 struct Rig {
   TargetField field;
+  DotDiscs dots;  ///< of the field's targets, where `rig.toml` names a file of them
   TargetLibrary library;
   std::vector<CameraModel> cameras;  ///< in the file's order; ids unique
   ForgingSpec forging;

@@ -20,6 +20,7 @@ struct Observation {
   double sigma_px = 0.0;        // detection and noise floor
   double field_sigma_mm = 0.0;  // of the target's coordinates
   bool used = true;
+  ObservedPoint eccentricity_px{};  // of the dot's image, where its disc is known
 };
 
 using Jacobian = Eigen::Matrix<double, 2, 6>;
@@ -140,6 +141,30 @@ bool update_used(std::vector<Observation>& observations, const CameraPose& pose,
   return changed;
 }
 
+// The centre of a dot's image is not the image of its centre.
+void correct_eccentricity(std::vector<Observation>& observations, const CameraModel& camera, const CameraPose& pose,
+                          const DotDiscs& dots) {
+  for (Observation& o : observations) {
+    const auto disc = dots.find(o.id);
+    if (disc == dots.end() || !(pose.cam_from_world(o.p_world_mm).z() > 2.0 * disc->second.radius)) continue;
+    o.eccentricity_px = eccentricity_px(camera, pose, o.p_world_mm, disc->second);
+    o.ideal = undistort(camera, {o.seen.x_px - o.eccentricity_px.x_px, o.seen.y_px - o.eccentricity_px.y_px});
+  }
+}
+
+// Adjusts and leaves out what does not fit, until it is the same targets. Returns the scale of the residuals.
+double settle(std::vector<Observation>& observations, CameraPose& pose, double f, const ResectConfig& config) {
+  double scale = 1.0;
+  for (int round = 0; round < 10; ++round) {
+    if (count_used(observations) < config.min_targets) break;
+    scale = residual_scale(observations, pose, f);
+    pose = adjust(observations, pose, f, scale);
+    scale = residual_scale(observations, pose, f);
+    if (!update_used(observations, pose, f, scale, config)) break;
+  }
+  return scale;
+}
+
 Resection describe(const CameraModel& camera, const std::vector<Observation>& observations, const CameraPose& pose) {
   Resection result;
   result.pose = pose;
@@ -149,8 +174,8 @@ Resection describe(const CameraModel& camera, const std::vector<Observation>& ob
     ResectedTarget target{o.id, 0.0, 0.0, o.used};
     if (p_cam.z() > 0) {
       const ObservedPoint expected = project(camera, p_cam);
-      target.dx_px = o.seen.x_px - expected.x_px;
-      target.dy_px = o.seen.y_px - expected.y_px;
+      target.dx_px = o.seen.x_px - o.eccentricity_px.x_px - expected.x_px;
+      target.dy_px = o.seen.y_px - o.eccentricity_px.y_px - expected.y_px;
     }
     if (o.used) sum += target.dx_px * target.dx_px + target.dy_px * target.dy_px;
     result.targets.push_back(target);
@@ -180,7 +205,7 @@ Result<void> ResectConfig::validate() const {
 }
 
 Result<Resection> resect(const CameraModel& camera, const std::vector<DetectedTarget>& detected,
-                         const TargetField& field, const ResectConfig& config) {
+                         const TargetField& field, const ResectConfig& config, const DotDiscs& dots) {
   if (auto valid = config.validate(); !valid) return pass_on(valid.error());
   const double f = camera.focal_length_px;
   std::vector<Observation> observations;
@@ -217,13 +242,10 @@ Result<Resection> resect(const CameraModel& camera, const std::vector<DetectedTa
   first.max_residual_px *= 2.0;
   first.reject_sigmas = 1e9;
   update_used(observations, pose, f, 1.0, first);
-  double scale = 1.0;
-  for (int round = 0; round < 10; ++round) {
-    if (count_used(observations) < config.min_targets) break;
-    scale = residual_scale(observations, pose, f);
-    pose = adjust(observations, pose, f, scale);
-    scale = residual_scale(observations, pose, f);
-    if (!update_used(observations, pose, f, scale, config)) break;
+  double scale = settle(observations, pose, f, config);
+  if (!dots.empty() && count_used(observations) >= config.min_targets) {
+    correct_eccentricity(observations, camera, pose, dots);
+    scale = settle(observations, pose, f, config);
   }
   if (count_used(observations) < config.min_targets) {
     return job_failed("camera \"{}\": only {} targets ({}) agree on a pose to {} px, expected at least {}{}", camera.id,

@@ -4,6 +4,7 @@
 
 #include "lib/camera/camera_model.h"
 #include "lib/camera/camera_pose.h"
+#include "lib/camera/dot_disc.h"
 #include "lib/result/result.h"
 #include "lib/targets/target_field.h"
 #include "node/detect/detect_targets.h"
@@ -36,8 +37,9 @@ struct Resection {
 /// The camera's pose with its covariance, from one image: start by consensus of minimal solutions, then
 /// Levenberg-Marquardt on the robust reprojection error, [B] 2.4 and equation 1. The covariance is that of
 /// the adjustment, scaled up (never down) by the residuals found.
+/// `dots`: where known, the eccentricity of a dot's image (dot_disc.h) is taken out, residuals included.
 /// Fails (job_failed) with fewer than `min_targets` usable targets, naming those it has.
 Result<Resection> resect(const CameraModel& camera, const std::vector<DetectedTarget>& detected,
-                         const TargetField& field, const ResectConfig& config);
+                         const TargetField& field, const ResectConfig& config, const DotDiscs& dots = {});
 
 }  // namespace imprint

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "cli/calibration_sheet.h"
+#include "tests/unit/paper_camera.h"
 
 using namespace imprint;
 using Catch::Matchers::Contains;
@@ -18,16 +19,8 @@ struct View {
   std::vector<DetectedTarget> targets;
 
   View() {
-    camera.id = "cam1";
-    camera.width_px = 4656;
-    camera.height_px = 3520;
-    camera.pixel_pitch_um = 3.8;
-    camera.focal_length_px = 5526.3;
-    camera.principal_point = {2327.5, 1759.5};
-    CameraModel lens = camera;
-    lens.focal_length_px = 5722.79;
-    lens.principal_point = {2367.8, 1736.88};
-    lens.distortion.radial = {-6.325e-3, 5.246e-4, 1.301e-5};
+    camera = paper_camera_as_engraved();
+    const CameraModel lens = paper_camera();
     pose.R_cam_world = rotation_from_vector({0.1, -0.2, 0.3});
     pose.center_world_mm = -pose.R_cam_world.transpose() * Eigen::Vector3d(100.0, 150.0, 8000.0);
     std::mt19937 random(1);

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "lib/camera/camera_file.h"
+#include "tests/unit/paper_camera.h"
 #include "tests/unit/temporary_folder.h"
 
 using namespace imprint;
@@ -14,13 +15,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 CameraModel strong_camera() {  // ten times the distortion of [B] table 3
-  CameraModel camera;
-  camera.id = "cam1";
-  camera.width_px = 4656;
-  camera.height_px = 3520;
-  camera.pixel_pitch_um = 3.8;
-  camera.focal_length_px = 5722.79;
-  camera.principal_point = {2367.8, 1736.88};
+  CameraModel camera = paper_camera();
   camera.distortion.radial = {-6.3e-2, 5.2e-3, 1.3e-4};
   camera.distortion.tangential = {-8.5e-4, 6.5e-4};
   camera.distortion.affine = {1.2e-3, 1.2e-3};

@@ -12,25 +12,13 @@
 
 #include "lib/camera/camera_file.h"
 #include "lib/camera/opencv_camera.h"
+#include "tests/unit/paper_camera.h"
 
 using namespace imprint;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
 
 namespace {
-
-CameraModel paper_camera() {
-  CameraModel camera;
-  camera.id = "cam1";
-  camera.width_px = 4656;
-  camera.height_px = 3520;
-  camera.pixel_pitch_um = 3.8;
-  camera.focal_length_px = 5722.79;
-  camera.principal_point = {2367.8, 1736.88};
-  camera.distortion.radial = {-6.325e-3, 5.246e-4, 1.301e-5};
-  camera.distortion.tangential = {-8.541e-5, 6.5e-5};
-  return camera;
-}
 
 struct Folder {
   fs::path path = fs::temp_directory_path() / fs::path("camera_yaml_test_" + std::to_string(::getpid()));
@@ -55,7 +43,7 @@ double largest_difference_px(const CameraModel& a, const CameraModel& b) {
 }
 
 std::string ros_yaml(const std::string& replace = "", const std::string& by = "") {
-  std::string text = camera_as_ros_yaml(paper_camera());
+  std::string text = camera_as_ros_yaml(paper_camera_without_affine());
   if (!replace.empty()) text.replace(text.find(replace), replace.size(), by);
   return text;
 }
@@ -63,7 +51,7 @@ std::string ros_yaml(const std::string& replace = "", const std::string& by = ""
 }  // namespace
 
 TEST_CASE("opencv camera: cv::projectPoints shows a point where ours says") {
-  const CameraModel camera = paper_camera();
+  const CameraModel camera = paper_camera_without_affine();
   const auto [converted, max_error_px] = to_opencv(camera);
   CHECK(max_error_px < 1e-6);  // without affine terms only the notation differs
   const cv::Matx33d matrix(converted.fx_px, 0, converted.cx_px, 0, converted.fy_px, converted.cy_px, 0, 0, 1);
@@ -79,7 +67,7 @@ TEST_CASE("opencv camera: cv::projectPoints shows a point where ours says") {
 }
 
 TEST_CASE("opencv camera: a shear is fitted, and the error stated is the error there is") {
-  CameraModel camera = paper_camera();
+  CameraModel camera = paper_camera_without_affine();
   camera.distortion.affine = {1.231e-4, 1.216e-4};
   const auto [converted, max_error_px] = to_opencv(camera);
   CHECK(max_error_px > 0.01);
@@ -93,7 +81,7 @@ TEST_CASE("opencv camera: a shear is fitted, and the error stated is the error t
 
 TEST_CASE("camera yaml: what is exported comes back, from both formats, through the reader of camN.toml") {
   const Folder folder;
-  const CameraModel camera = paper_camera();
+  const CameraModel camera = paper_camera_without_affine();
   for (const auto& [name, text] : {std::pair{"cam1.opencv.yaml", camera_as_opencv_yaml(camera)},
                                    std::pair{"cam1.ros.yml", camera_as_ros_yaml(camera)}}) {
     std::vector<std::string> warnings;
@@ -109,7 +97,7 @@ TEST_CASE("camera yaml: what is exported comes back, from both formats, through 
 
 TEST_CASE("camera yaml: OpenCV itself reads the export") {
   const Folder folder;
-  const auto path = folder.write("cam1.yaml", camera_as_opencv_yaml(paper_camera()));
+  const auto path = folder.write("cam1.yaml", camera_as_opencv_yaml(paper_camera_without_affine()));
   cv::FileStorage storage(path.string(), cv::FileStorage::READ);
   REQUIRE(storage.isOpened());
   cv::Mat matrix, coefficients;

@@ -5,6 +5,8 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 
+#include "tests/unit/paper_camera.h"
+
 using namespace imprint;
 using Catch::Matchers::Contains;
 
@@ -17,12 +19,7 @@ struct Setup {
   TargetField field;
 
   explicit Setup(int targets, unsigned seed = 1) {
-    camera.id = "cam1";
-    camera.width_px = 4656;
-    camera.height_px = 3520;
-    camera.focal_length_px = 5722.79;
-    camera.principal_point = {2367.8, 1736.88};
-    camera.distortion.radial = {-6.3e-3, 5.2e-4, 1.3e-5};
+    camera = paper_camera();
     pose.R_cam_world = rotation_from_omega_phi_kappa({3.83, 0.014, 3.07}).transpose();
     pose.center_world_mm = {-553.64, -5503.11, 6996.44};
     std::mt19937 random(seed);
@@ -189,4 +186,53 @@ TEST_CASE("resect: targets on one line do not give a pose") {
   for (auto& [id, target] : setup.field.targets) target.p_world_mm = Eigen::Vector3d(100.0 * id, 0.0, 500.0);
   const auto result = resect(setup.camera, setup.detect(0.0, 1), setup.field, ResectConfig{});
   CHECK(!result);
+}
+
+namespace {
+
+// Centre of the ellipse that a disc is seen as: the pole of the line at infinity, by the dual conic.
+ObservedPoint centre_of_ellipse(const CameraModel& camera, const CameraPose& pose, const Eigen::Vector3d& p_world_mm,
+                                const DotDisc& disc) {
+  const Eigen::Vector3d side = disc.normal.unitOrthogonal(), up = disc.normal.cross(side);
+  Eigen::Matrix3d from_disc;
+  from_disc << pose.R_cam_world * side, pose.R_cam_world * up, pose.cam_from_world(p_world_mm);
+  from_disc.topRows<2>() *= camera.focal_length_px;
+  const double r2 = disc.radius * disc.radius;
+  const Eigen::Matrix3d dual = from_disc * Eigen::Vector3d(r2, r2, -1.0).asDiagonal() * from_disc.transpose();
+  return distort(camera, {dual(0, 2) / dual(2, 2), dual(1, 2) / dual(2, 2)});
+}
+
+}  // namespace
+
+TEST_CASE("resect: large dots seen aslant shift the pose; with their size and normal known the shift is gone") {
+  double without_mm = 0.0, with_mm = 0.0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Setup setup(12, seed);
+    auto detected = setup.detect(0.005, seed);
+    DotDiscs dots;
+    double largest_px = 0.0;
+    for (DetectedTarget& target : detected) {
+      const Eigen::Vector3d p = setup.field.targets.at(target.id).p_world_mm;
+      // On two walls at right angles, each seen at 45 degrees.
+      const Eigen::Vector3d normal_cam(target.id % 2 == 0 ? 0.7 : -0.7, 0.1, -0.7);
+      const DotDisc disc{60.0, (setup.pose.R_cam_world.transpose() * normal_cam).normalized(), 0};
+      const ObservedPoint seen = centre_of_ellipse(setup.camera, setup.pose, p, disc);
+      const ObservedPoint centre = project(setup.camera, setup.pose.cam_from_world(p));
+      target.center.x_px += seen.x_px - centre.x_px;
+      target.center.y_px += seen.y_px - centre.y_px;
+      largest_px = std::max(largest_px, std::hypot(seen.x_px - centre.x_px, seen.y_px - centre.y_px));
+      dots[target.id] = disc;
+    }
+    CHECK(largest_px > 0.1);
+    const auto without = resect(setup.camera, detected, setup.field, exact_config(0.01));
+    const auto with = resect(setup.camera, detected, setup.field, exact_config(0.01), dots);
+    REQUIRE(without);
+    REQUIRE(with);
+    without_mm += (without->pose.center_world_mm - setup.pose.center_world_mm).norm() / 10.0;
+    with_mm += (with->pose.center_world_mm - setup.pose.center_world_mm).norm() / 10.0;
+    CHECK(with->reprojection_rms_px < 0.015);  // the noise of two coordinates, and 64 corners for a circle
+    CHECK(with->reprojection_rms_px < 0.5 * without->reprojection_rms_px);
+  }
+  INFO("centre off " << without_mm << " mm, with known dots " << with_mm);
+  CHECK(with_mm < 0.2 * without_mm);
 }
