@@ -1,12 +1,23 @@
 #include "cli/calibration_start.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "lib/adjust/calibration_review.h"
 #include "node/resect/resect.h"
 
 namespace imprint {
 namespace {
+
+// Whether those of the field's targets that the image shows stand on one line: they fit any turn about it.
+bool on_one_line(const std::vector<DetectedTarget>& targets, const TargetField& field) {
+  CalibrationImage image;
+  for (const DetectedTarget& target : targets) image.points.push_back({target.id, target.center, target.sigma_px});
+  const auto known = std::ranges::count_if(targets, [&](const auto& t) { return field.targets.contains(t.id); });
+  constexpr double kOnALine = 0.02;  // of their extent
+  return known >= 3 && field_extents({image}, field)[1] < kOnALine;
+}
 
 Result<Resection> rough_pose(const CameraModel& camera, const std::vector<DetectedTarget>& targets,
                              const TargetField& field) {
@@ -58,6 +69,11 @@ std::optional<double> fitting_focal_length(CameraModel camera, const std::vector
 
 Result<CameraPose> calibration_start(const CameraModel& nominal, const std::vector<DetectedTarget>& targets,
                                      const TargetField& field) {
+  if (on_one_line(targets, field))
+    return invalid_input(
+        "the targets it shows stand on one line by the field; check the field's columns, or spread the targets over "
+        "the "
+        "image and in depth");
   const auto resection = rough_pose(nominal, targets, field);
   constexpr int kMoreThanChance = 2;
   const int fitting = resection ? used_targets(*resection) : 0;

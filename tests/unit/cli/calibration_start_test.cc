@@ -73,6 +73,15 @@ TEST_CASE("calibrate: a mirrored field that is flat but for five targets is refu
   CHECK_THAT(start.error().message, Contains("mirror image"));
 }
 
+TEST_CASE("calibrate: a field whose targets stand on one line is refused for that") {
+  View view;
+  for (auto& [id, target] : view.field.targets) target.p_world_mm = {100.0 * id, 5.0 * id, 0.0};
+  const auto start = calibration_start(view.camera, view.targets, view.field);
+  REQUIRE(!start);
+  CHECK(start.error().exit_status() == 2);
+  CHECK_THAT(start.error().message, Contains("on one line"));
+}
+
 TEST_CASE("calibrate: a pixel pitch wrong by ten either way is refused, with the focal length that would fit") {
   for (const double factor : {10.0, 0.1}) {
     View view;
