@@ -8,6 +8,7 @@
 #include "fusion/fusion_pipeline.h"
 #include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
+#include "lib/rig/session_file.h"
 #include "lib/wire/wire.h"
 #include "node/capture/image_file.h"
 #include "node/node_pipeline.h"
@@ -73,7 +74,8 @@ Result<Observation> observe(const SessionObservation& files, int index, const st
 Result<Measurement> measure(const MeasureOptions& options) {
   const auto method = edge_method_from_name(options.method);
   if (!method) return pass_on(method.error());
-  const auto session = read_session_file(options.session);
+  std::vector<std::string> warnings;
+  const auto session = read_session_file(options.session, warnings);
   if (!session) return pass_on(session.error());
   const auto rig = read_rig(session->rig);
   if (!rig) return pass_on(rig.error());
@@ -86,6 +88,7 @@ Result<Measurement> measure(const MeasureOptions& options) {
   auto measurement = fuse(observations, rig->forging, options.session.stem().string(), options.method);
   if (!measurement) return measurement;
   measurement->warnings.insert(measurement->warnings.begin(), rig->warnings.begin(), rig->warnings.end());
+  measurement->warnings.insert(measurement->warnings.begin(), warnings.begin(), warnings.end());
   measurement->made_at = utc_text(wall_clock_ns());
   return measurement;
 }

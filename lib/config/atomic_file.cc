@@ -14,6 +14,17 @@
 namespace imprint {
 namespace {
 
+// A full or broken disk is no fault of what was asked for: the same call succeeds once there is room.
+Error write_failure(const std::filesystem::path& path, int reason) {
+  const bool disk = reason == ENOSPC || reason == EDQUOT || reason == EIO;
+  const char* advice = reason == ENOSPC || reason == EDQUOT ? "; make room there or write elsewhere"
+                       : reason == EIO                      ? "; the disk or the link to it is broken"
+                       : reason == EISDIR                   ? "; name a file, not a folder"
+                                                            : "; check that the folder exists and is writable";
+  return {disk ? ErrorKind::job_failed : ErrorKind::invalid_input,
+          fmt::format("{}: cannot be written: {}{}", path.string(), std::strerror(reason), advice)};
+}
+
 // Closes on every way out; `close` tells whether the last bytes reached the file.
 class FileDescriptor {
  public:
@@ -46,15 +57,14 @@ Result<void> write_file_atomically(const std::filesystem::path& path, std::strin
   std::string temporary = path.string() + ".XXXXXX";
   FileDescriptor file(::mkostemp(temporary.data(), O_CLOEXEC));
   if (file.get() < 0) {
-    return invalid_input("{}: cannot be written: {}; check that the folder exists and is writable", path.string(),
-                         std::strerror(errno));
+    return pass_on(write_failure(path, errno));
   }
   const bool written = ::fchmod(file.get(), 0644) == 0 && write_all(file.get(), bytes) && ::fsync(file.get()) == 0 &&
                        file.close() && ::rename(temporary.c_str(), path.c_str()) == 0;
   if (!written) {
     const int reason = errno;
     ::unlink(temporary.c_str());
-    return invalid_input("{}: cannot be written: {}", path.string(), std::strerror(reason));
+    return pass_on(write_failure(path, reason));
   }
   return {};
 }

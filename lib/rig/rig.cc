@@ -4,6 +4,7 @@
 
 #include "lib/camera/camera_file.h"
 #include "lib/config/toml_file.h"
+#include "lib/config/unknown_keys.h"
 
 namespace imprint {
 namespace {
@@ -43,6 +44,7 @@ Result<std::vector<CameraModel>> read_cameras(const std::filesystem::path& path,
   for (const toml::table* entry : read.tables("camera")) {
     TomlReader read_entry(path, *entry, fmt::format("camera[{}].", number++));
     const auto id = read_entry.string("id");
+    note_unknown_keys(path, *entry, fmt::format("camera[{}].", number - 1), {"id", "calibration"}, warnings);
     const auto file = read_entry.path("calibration");
     if (read_entry.error()) return pass_on(*read_entry.error());
     auto camera = read_camera_file(file, &warnings);
@@ -80,6 +82,11 @@ Result<Rig> read_rig(const std::filesystem::path& path) {
   Rig rig;
   rig.forging = read_forging(read);
   auto cameras = read_cameras(path, read, rig.warnings);
+  note_unknown_keys(path, *table, "", {"field", "library", "camera", "forging"}, rig.warnings);
+  if (const toml::table* forging = (*table)["forging"].as_table()) {
+    note_unknown_keys(path, *forging, "forging.", {"diameter_mm", "axis_direction", "end_section_mm", "polarity"},
+                      rig.warnings);
+  }
   if (read.error()) return pass_on(*read.error());
   if (!cameras) return pass_on(cameras.error());
   rig.cameras = std::move(*cameras);

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "lib/rig/session_file.h"
 #include "tests/unit/temporary_folder.h"
 
 using namespace imprint;
@@ -112,4 +113,31 @@ TEST_CASE("session: observations with their images, made absolute; faults named"
              Contains("s.toml:5") && Contains("cam1"));
   CHECK_THAT(read_session_file(folder.write("s.toml", replaced(good, "30.0", "inf"))).error().message,
              Contains("s.toml:3"));
+}
+
+TEST_CASE("rig and session: a key nobody knows is a warning with its line, for it may be a mistyped one") {
+  RigFolder folder;
+  REQUIRE(read_rig(folder / "rig.toml")->warnings.empty());
+  folder.write("rig.toml", replaced(kRig, "polarity", "polarityy"));
+  const auto rig = read_rig(folder / "rig.toml");
+  REQUIRE(rig);
+  REQUIRE(rig->warnings.size() == 1);
+  CHECK_THAT(rig->warnings[0], Contains("rig.toml:9: forging.polarityy: unknown key") && Contains("polarity"));
+  folder.write("session.toml",
+               "rig = \"rig.toml\"\nplace = 1\n[[observation]]\nrotation_degg = 60.0\nimages = { cam1 = \"a.png\" }\n");
+  std::vector<std::string> warnings;
+  REQUIRE(read_session_file(folder / "session.toml", warnings));
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0], Contains("session.toml:2: place: unknown key"));
+  CHECK_THAT(warnings[1], Contains("session.toml:4: observation[0].rotation_degg: unknown key"));
+}
+
+TEST_CASE("session: one image for two cameras is refused") {
+  RigFolder folder;
+  folder.write("session.toml",
+               "rig = \"rig.toml\"\n[[observation]]\nimages = { cam1 = \"a.png\", cam2 = \"a.png\" }\n");
+  const auto session = read_session_file(folder / "session.toml");
+  REQUIRE_FALSE(session);
+  CHECK(session.error().exit_status() == 2);
+  CHECK_THAT(session.error().message, Contains("images.cam2: expected an image of its own, found that of cam1"));
 }
