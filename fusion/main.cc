@@ -28,14 +28,12 @@ void attend(const FusionService& service, StopSignal& stop) {
   }
 }
 
-Result<void> check_store(const FusionConfig& config) {
+// A folder, or a name that is free.
+Result<void> check_result_dir(const FusionConfig& config) {
   std::error_code ignored;
-  if (std::filesystem::exists(config.database, ignored)) {
-    if (const auto store = SessionStore::open(config.database); !store) return pass_on(store.error());
-  } else if (!std::filesystem::is_directory(config.database.parent_path(), ignored)) {
-    return invalid_input("fusion.database: {}: the folder does not exist", config.database.string());
-  }
-  return {};
+  if (config.result_dir.empty() || std::filesystem::is_directory(config.result_dir, ignored)) return {};
+  if (!std::filesystem::exists(config.result_dir, ignored)) return {};
+  return invalid_input("fusion.result_dir: {}: expected a folder, found a file", config.result_dir.string());
 }
 
 Result<void> run(const ProgramOptions& options) {
@@ -50,8 +48,9 @@ Result<void> run(const ProgramOptions& options) {
   }
   const auto rig = read_rig(config->rig);
   if (!rig) return pass_on(rig.error());
+  if (auto checked = check_result_dir(*config); !checked) return checked;
   if (options.check) {
-    if (auto checked = check_store(*config); !checked) return checked;
+    if (auto checked = SessionStore::check(config->database); !checked) return checked;
     std::cout << options.config.string() << ": OK\n";
     return {};
   }

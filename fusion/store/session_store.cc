@@ -5,6 +5,8 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include "fusion/store/store_lock.h"
+
 namespace imprint {
 namespace {
 
@@ -36,6 +38,20 @@ CREATE TABLE result (
 );
 )sql";
 
+// Whether this program can use the database as it is; its schema's version.
+Result<int> known_version(SQLite::Database& db, const std::filesystem::path& path) {
+  const int version = db.execAndGet("PRAGMA user_version").getInt();
+  if (version > kSchemaVersion) {
+    return invalid_input(
+        "{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
+        path.string(), version, kSchemaVersion);
+  }
+  if (version == 0 && db.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0) {
+    return invalid_input("{}: a database of another program; name another file", path.string());
+  }
+  return version;
+}
+
 StoredResult read_result(const SQLite::Statement& row) {
   StoredResult result;
   result.session = row.getColumn(0).getString();
@@ -51,22 +67,17 @@ constexpr const char* kSelectResult = "SELECT session, complete, error, json, ma
 
 class SqliteStore final : public SessionStore {
  public:
-  explicit SqliteStore(const std::filesystem::path& path)
-      : path_(path), db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
+  SqliteStore(const std::filesystem::path& path, StoreLock lock)
+      : path_(path),
+        lock_(std::move(lock)),
+        db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
 
   Result<void> prepare() {
-    const int version = db_.execAndGet("PRAGMA user_version").getInt();
-    if (version > kSchemaVersion) {
-      return invalid_input(
-          "{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
-          path_.string(), version, kSchemaVersion);
-    }
-    if (version == 0 && db_.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0) {
-      return invalid_input("{}: a database of another program; name another file", path_.string());
-    }
+    const auto version = known_version(db_, path_);
+    if (!version) return pass_on(version.error());
     db_.exec("PRAGMA journal_mode = WAL");
     db_.exec("PRAGMA synchronous = FULL");
-    if (version == 0) {
+    if (*version == 0) {
       SQLite::Transaction transaction(db_);
       db_.exec(kSchema);
       db_.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
@@ -234,6 +245,7 @@ ORDER BY newest)sql");
   }
 
   std::filesystem::path path_;
+  StoreLock lock_;
   std::mutex mutex_;
   SQLite::Database db_;
 };
@@ -241,10 +253,27 @@ ORDER BY newest)sql");
 }  // namespace
 
 Result<std::unique_ptr<SessionStore>> SessionStore::open(const std::filesystem::path& path) {
+  auto lock = StoreLock::take(path);
+  if (!lock) return pass_on(lock.error());
   try {
-    auto store = std::make_unique<SqliteStore>(path);
+    auto store = std::make_unique<SqliteStore>(path, std::move(*lock));
     if (auto ready = store->prepare(); !ready) return pass_on(ready.error());
     return store;
+  } catch (const SQLite::Exception& error) {
+    return invalid_input("{}: cannot be opened as a database: {}", path.string(), error.what());
+  }
+}
+
+Result<void> SessionStore::check(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    if (std::filesystem::is_directory(path.parent_path(), ignored)) return {};
+    return invalid_input("{}: the folder does not exist", path.string());
+  }
+  try {
+    SQLite::Database db(path.string(), SQLite::OPEN_READONLY, kBusyTimeoutMs);
+    if (const auto version = known_version(db, path); !version) return pass_on(version.error());
+    return {};
   } catch (const SQLite::Exception& error) {
     return invalid_input("{}: cannot be opened as a database: {}", path.string(), error.what());
   }

@@ -48,9 +48,11 @@ struct StoredMessage {
 /// leaves a file that opens again without repair. Safe to use from several threads.
 class SessionStore {
  public:
-  /// Opens or creates the file. Fails (invalid_input) when it cannot be opened, is no such database or was written by
-  /// a newer version.
+  /// Opens or creates the file. Fails (invalid_input) when another program has it open as its store, when it cannot be
+  /// opened, is no such database or was written by a newer version.
   static Result<std::unique_ptr<SessionStore>> open(const std::filesystem::path& path);
+  /// Whether `open` would find a database it can use, or a place to make one. Changes nothing; the file may be in use.
+  static Result<void> check(const std::filesystem::path& path);
   virtual ~SessionStore() = default;
 
   /// False when this imprint (camera, boot, sequence) is already stored. All writes fail (job_failed) with the

@@ -121,6 +121,27 @@ TEST_CASE("store: a process killed without warning loses nothing it was told is 
   REQUIRE(open(folder / "a.db")->messages("S")->size() == 50);
 }
 
+TEST_CASE("store: a second fusion node is kept from the database, until the first has ended") {
+  const TemporaryFolder folder;
+  auto first = open(folder / "a.db");
+  const auto second = SessionStore::open(folder / "a.db");
+  REQUIRE_FALSE(second);
+  REQUIRE(second.error().exit_status() == 2);
+  REQUIRE(second.error().message.find("a.db: in use by another imprint-fusion") != std::string::npos);
+  REQUIRE(SessionStore::check(folder / "a.db"));  // a config may be checked while the line runs
+  first.reset();
+  REQUIRE(SessionStore::open(folder / "a.db"));
+}
+
+TEST_CASE("store: checking makes no file, and refuses what open would refuse") {
+  const TemporaryFolder folder;
+  REQUIRE(SessionStore::check(folder / "new.db"));
+  REQUIRE_FALSE(std::filesystem::exists(folder / "new.db"));
+  REQUIRE_FALSE(SessionStore::check(folder / "no/such/folder/new.db"));
+  folder.write("text.db", std::string(4096, 'x'));
+  REQUIRE_FALSE(SessionStore::check(folder / "text.db"));
+}
+
 TEST_CASE("store: a file that is no database, of another program or of a newer version is refused by name") {
   const TemporaryFolder folder;
   folder.write("text.db", std::string(4096, 'x'));
