@@ -216,7 +216,7 @@ void FusionService::receive_health(const Message& message) {
   if (keys_->camera_of(message.key) != health->camera_id) {
     return malformed(message, fmt::format("carries the health of camera {}", health->camera_id));
   }
-  board_.set_health(*health, std::chrono::steady_clock::now());
+  if (const auto raised = board_.set_health(*health, std::chrono::steady_clock::now())) spdlog::error("{}", *raised);
 }
 
 void FusionService::receive_liveness(const std::string& camera_id, bool alive) {

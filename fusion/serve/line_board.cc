@@ -9,6 +9,9 @@ namespace {
 
 using nlohmann::json;
 
+constexpr auto kNamesakesGone = std::chrono::seconds(120);  // past the longest pause a node makes within a frame (60 s)
+constexpr std::size_t kMaxBoots = 16;
+
 double age_s(LineBoard::Time then, LineBoard::Time now) {
   return std::chrono::duration_cast<std::chrono::duration<double>>(now - then).count();
 }
@@ -88,12 +91,36 @@ void LineBoard::set_alive(const std::string& camera_id, bool alive) {
   if (const auto camera = cameras_.find(camera_id); camera != cameras_.end()) camera->second.alive = alive;
 }
 
-void LineBoard::set_health(const Health& health, Time now) {
+std::optional<std::string> LineBoard::set_health(const Health& health, Time now) {
   const std::lock_guard lock(mutex_);
   const auto camera = cameras_.find(health.camera_id);
-  if (camera == cameras_.end()) return;
+  if (camera == cameras_.end()) return std::nullopt;
+  auto raised = watch_for_namesakes(camera->second, health, now);
   camera->second.health = health;
   camera->second.health_at = now;
+  return raised;
+}
+
+std::optional<std::string> LineBoard::watch_for_namesakes(Camera& camera, const Health& health, Time now) {
+  const auto known = camera.boots.find(health.boot_id);
+  const bool after_another = camera.health && camera.health->boot_id != health.boot_id;
+  const bool late = known != camera.boots.end() && health.time_ns <= known->second;  // it was sent before the other's
+  const bool came_back = after_another && known != camera.boots.end() && !late;
+  const bool is_new = came_back && !camera.shared_at;
+  const std::string name = "two_nodes_" + health.camera_id;
+  if (came_back) {
+    camera.shared_at = now;
+    alarms_[name] = fmt::format(
+        "camera {0}: two nodes send under this name (boot ids {1} and {2}); stop one of them or give it its own "
+        "node.camera_id",
+        health.camera_id, hex(camera.health->boot_id), hex(health.boot_id));
+  } else if (camera.shared_at && now - *camera.shared_at >= kNamesakesGone) {
+    camera.shared_at.reset();
+    alarms_.erase(name);
+  }
+  if (known == camera.boots.end() && camera.boots.size() >= kMaxBoots) camera.boots.clear();
+  if (!late) camera.boots[health.boot_id] = health.time_ns;
+  return is_new ? std::optional(alarms_[name]) : std::nullopt;
 }
 
 void LineBoard::note_imprint(const Imprint& imprint, Time now) {

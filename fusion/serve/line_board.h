@@ -45,7 +45,10 @@ class LineBoard {
   LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started);
 
   void set_alive(const std::string& camera_id, bool alive);
-  void set_health(const Health& health, Time now);
+  /// Two nodes that send under one camera's name make the alarm `two_nodes_<camera>`: a boot id that comes back after
+  /// another one was heard is no restart. It ends when only one has been heard for two minutes. Gives the text of the
+  /// alarm when this record has raised it, else nothing.
+  std::optional<std::string> set_health(const Health& health, Time now);
   void note_imprint(const Imprint& imprint, Time now);
   void set_session(CurrentSession session);
   void set_result(const StoredResult& result);
@@ -63,9 +66,12 @@ class LineBoard {
     bool alive = false;
     std::optional<Health> health;
     Time health_at;
-    std::optional<Imprint> imprint;  // without its curves
+    std::map<std::uint64_t, std::int64_t> boots;  // boot ids heard, each with the node's time of its newest record
+    std::optional<Time> shared_at;                // when two nodes were last seen to take turns
+    std::optional<Imprint> imprint;               // without its curves
     Time imprint_at;
   };
+  std::optional<std::string> watch_for_namesakes(Camera& camera, const Health& health, Time now);
   [[nodiscard]] static nlohmann::json camera_json(const std::string& id, const Camera& camera, Time now);
 
   mutable std::mutex mutex_;

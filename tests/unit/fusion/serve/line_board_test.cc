@@ -58,6 +58,54 @@ TEST_CASE("board: the last result is shown without its sections, so that the sta
   REQUIRE_FALSE(last["result"].contains("sections"));
 }
 
+namespace {
+
+Health health_of(std::uint64_t boot_id, std::int64_t sent_s) {
+  Health health;
+  health.camera_id = "cam1";
+  health.boot_id = boot_id;
+  health.time_ns = sent_s * 1'000'000'000;
+  return health;
+}
+
+}  // namespace
+
+TEST_CASE("board: a node that was started anew is no second node") {
+  LineBoard line({}, {"cam1"}, kStart);
+  for (int boot = 1; boot <= 40; ++boot) {  // more often than boot ids are kept
+    for (int i = 0; i < 3; ++i) {
+      const int second = 10 * boot + i;
+      REQUIRE_FALSE(
+          line.set_health(health_of(static_cast<std::uint64_t>(boot), second), kStart + std::chrono::seconds(second)));
+    }
+  }
+  REQUIRE_FALSE(line.has_alarm());
+}
+
+TEST_CASE("board: a record of the former start that comes late is no second node") {
+  LineBoard line({}, {"cam1"}, kStart);
+  line.set_health(health_of(1, 5), kStart);
+  line.set_health(health_of(2, 9), kStart);
+  REQUIRE_FALSE(line.set_health(health_of(1, 4), kStart));
+  REQUIRE_FALSE(line.has_alarm());
+}
+
+TEST_CASE("board: two nodes under one name raise an alarm once, until one has been gone for two minutes") {
+  LineBoard line({}, {"cam1"}, kStart);
+  line.set_health(health_of(1, 0), kStart);
+  REQUIRE_FALSE(line.set_health(health_of(2, 1), kStart));
+  const auto raised = line.set_health(health_of(1, 5), kStart);
+  REQUIRE(raised);
+  REQUIRE(raised->find("camera cam1: two nodes") == 0);
+  REQUIRE(raised->find("0000000000000002") != std::string::npos);
+  REQUIRE(line.status(kStart)["alarms"][0]["name"] == "two_nodes_cam1");
+  REQUIRE_FALSE(line.set_health(health_of(2, 6), kStart + std::chrono::seconds(1)));
+  line.set_health(health_of(2, 11), kStart + std::chrono::seconds(100));
+  REQUIRE(line.has_alarm());
+  line.set_health(health_of(2, 16), kStart + std::chrono::seconds(121));
+  REQUIRE_FALSE(line.has_alarm());
+}
+
 TEST_CASE("board: an alarm stands until it is over") {
   LineBoard line({}, {}, kStart);
   line.set_alarm("store", "disk full");
