@@ -67,7 +67,7 @@ std::string results(const Measurement& m, const TruthComparison* truth, const Re
       figure("direction", "Largest deflection", drawn.direction));
   text +=
       "<p class=\"note\">The interval of a largest or smallest value is that of its section; a median stands with the "
-      "median interval. The direction is seen from the first end.</p>\n";
+      "median interval. The direction is seen from the first end, z up.</p>\n";
   if (truth != nullptr) text += "<p>" + markup_text(truth_text(m, *truth)) + ".</p>\n";
   return text;
 }

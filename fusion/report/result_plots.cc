@@ -23,16 +23,29 @@ std::vector<PlotPoint> curve(const Sections& sections, const std::function<doubl
   return points;
 }
 
-// The curve's own range, its bands in view as long as they are no taller than the curve itself twice over: one bad
-// stretch must not press the rest flat.
+// The half-width that all bands but the widest tenth keep to.
+double usual_ci95(const std::vector<PlotPoint>& points) {
+  constexpr double kUsualShare = 0.9;  // the slopes of steps, where a width means little, take less than a tenth
+  std::vector<double> widths;
+  for (const PlotPoint& p : points) {
+    if (std::isfinite(p.ci95)) widths.push_back(p.ci95);
+  }
+  if (widths.empty()) return 0.0;
+  const auto at = widths.begin() + static_cast<std::ptrdiff_t>(kUsualShare * static_cast<double>(widths.size() - 1));
+  std::nth_element(widths.begin(), at, widths.end());
+  return *at;
+}
+
+// The curves' range with their bands in view, but for those that are out of the ordinary: one bad stretch must not
+// press the rest flat.
 PlotRange range_with_bands(const std::vector<const std::vector<PlotPoint>*>& curves) {
-  PlotRange range = range_of(curves, kLeastRangeMm);
-  const double room = range.high - range.low;
   std::vector<PlotPoint> edges;
   for (const auto* points : curves) {
+    const double usual = usual_ci95(*points);
     for (const PlotPoint& p : *points) {
-      edges.push_back({p.x, p.y + std::min(p.ci95, room), 0.0});
-      edges.push_back({p.x, p.y - std::min(p.ci95, room), 0.0});
+      const double ci95 = std::isfinite(p.ci95) ? std::min(p.ci95, usual) : 0.0;
+      edges.push_back({p.x, p.y + ci95, 0.0});
+      edges.push_back({p.x, p.y - ci95, 0.0});
     }
   }
   return range_of({&edges}, kLeastRangeMm);
@@ -50,16 +63,16 @@ std::string draw_curve(std::string y_label, PlotRange range, std::vector<PlotPoi
 }
 
 std::string draw_direction(double y_mm, double z_mm) {
-  // Looking along +x with y to the right, z points down.
+  // Looking along +x from the first end with z up, as one who stands there sees it: y points to the left.
   std::string svg =
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-100 -100 240 225\" role=\"img\">"
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-140 -125 240 225\" role=\"img\">"
       "<circle cx=\"0\" cy=\"0\" r=\"90\" fill=\"none\" class=\"zero\"/>"
       "<line x1=\"-90\" y1=\"0\" x2=\"90\" y2=\"0\" class=\"grid\"/>"
       "<line x1=\"0\" y1=\"-90\" x2=\"0\" y2=\"90\" class=\"grid\"/>"
-      "<text x=\"98\" y=\"5\">+y</text><text x=\"0\" y=\"112\" text-anchor=\"middle\">+z</text>";
+      "<text x=\"-98\" y=\"5\" text-anchor=\"end\">+y</text><text x=\"0\" y=\"-98\" text-anchor=\"middle\">+z</text>";
   if (const double size = std::hypot(y_mm, z_mm); size > 0.0) {
-    svg += fmt::format("<line x1=\"0\" y1=\"0\" x2=\"{:.2f}\" y2=\"{:.2f}\" class=\"needle\"/>", 88.0 * y_mm / size,
-                       88.0 * z_mm / size);
+    svg += fmt::format("<line x1=\"0\" y1=\"0\" x2=\"{:.2f}\" y2=\"{:.2f}\" class=\"needle\"/>", -88.0 * y_mm / size,
+                       -88.0 * z_mm / size);
   }
   return svg + "</svg>";
 }

@@ -12,7 +12,7 @@ namespace imprint {
 struct ResultPlots {
   std::string axis_xy, axis_xz;  ///< the aligned axis in two planes, on one scale, with the zero in view
   std::string diameter, circularity;
-  std::string direction;  ///< of the largest deflection, seen along +x from the first end
+  std::string direction;  ///< of the largest deflection, seen along +x from the first end, z up and so y to the left
 };
 
 /// `reference` are the sections the result is compared with (the truth of a simulated forging); may be empty.

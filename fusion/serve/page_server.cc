@@ -46,8 +46,11 @@ class HttpPageServer final : public PageServer {
     port_ = config.port == 0 ? server_.bind_to_any_port(config.address)
                              : (server_.bind_to_port(config.address, config.port) ? config.port : -1);
     if (port_ <= 0) {
-      return job_failed("page: cannot listen on {}:{}; is the address this machine's and the port free?",
-                        config.address, config.port);
+      return job_failed(
+          "page: cannot listen on {}:{}: another program (a second imprint-fusion?) has the port, or the address is "
+          "not "
+          "this machine's; change page.port or page.address",
+          config.address, config.port);
     }
     thread_ = std::thread([this] { server_.listen_after_bind(); });
     while (!server_.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stop() before is lost

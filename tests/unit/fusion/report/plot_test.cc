@@ -99,4 +99,27 @@ TEST_CASE("result plots: both planes of the axis are on one scale, the truth bes
   REQUIRE(draw_result(Measurement{}).axis_xy.empty());
 }
 
+TEST_CASE("result plots: a few wide bands, as on the slopes of steps, do not press the diameter flat") {
+  Measurement measurement;
+  for (int i = 0; i < 500; ++i) {
+    const bool slope = i >= 240 && i < 260;
+    measurement.sections.push_back(
+        {4.0 * i, {4.0 * i, 0.0, 0.0}, 0.0, i < 250 ? 180.0 : 300.0, 1.0, 0.3, slope ? 200.0 : 0.5, 0.3});
+  }
+  const auto labels = y_labels(draw_result(measurement).diameter);
+  REQUIRE_FALSE(labels.empty());
+  REQUIRE(std::stod(labels.front()) <= 320.0);  // 300 mm with the usual band and the plot's own padding
+  REQUIRE(std::stod(labels.back()) >= 160.0);
+}
+
+TEST_CASE("result plots: the direction is drawn as one who stands at the first end sees it, z up and y to the left") {
+  Measurement measurement;
+  for (int i = 0; i < 3; ++i)
+    measurement.sections.push_back({1.0 * i, {1.0 * i, 0.0, 0.0}, 0.0, 200.0, 1.0, 0.3, 0.3, 0.3});
+  measurement.sections[1].axis_mm[1] = 3.0;
+  measurement.sections[1].axis_mm[2] = 4.0;
+  measurement.sections[1].deflection_mm = 5.0;
+  REQUIRE(draw_result(measurement).direction.find("x2=\"-52.80\" y2=\"-70.40\" class=\"needle\"") != std::string::npos);
+}
+
 }  // namespace imprint
