@@ -5,6 +5,15 @@
 #include "lib/daemon/program.h"
 
 namespace imprint {
+namespace {
+
+// A part's own complaint begins with its name for the key; here the key is the file's.
+std::string without_key(const std::string& message) {
+  const auto colon = message.find(": ");
+  return colon == std::string::npos ? message : message.substr(colon + 2);
+}
+
+}  // namespace
 
 Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const toml::table& table) {
   FusionConfig config;
@@ -21,9 +30,13 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   config.log_level = read_choice(read, "fusion.log_level", kLogLevels, config.log_level);
   config.zenoh = read_zenoh_section(read, config.zenoh);
   config.page.address = read.string("page.address", config.page.address);
-  config.page.port = static_cast<int>(std::clamp<std::int64_t>(read.integer("page.port", config.page.port), -1, 65536));
-  if (const auto valid = config.assembler.validate(); !valid) read.fault("fusion.deadline_s", valid.error().message);
-  if (const auto valid = config.page.validate(); !valid) read.fault("page.port", valid.error().message);
+  const std::int64_t port = read.integer("page.port", config.page.port);
+  if (port < 0 || port > 65535) read.fault("page.port", fmt::format("expected 0 to 65535, found {}", port));
+  config.page.port = static_cast<int>(std::clamp<std::int64_t>(port, 0, 65535));
+  if (const auto valid = config.assembler.validate(); !valid) {
+    read.fault("fusion.deadline_s", without_key(valid.error().message));
+  }
+  if (const auto valid = config.page.validate(); !valid) read.fault("page.address", without_key(valid.error().message));
   if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
     read.fault("zenoh.listen", "no endpoint here nor in zenoh.connect: no camera could reach this program");
   }

@@ -15,15 +15,18 @@ std::optional<int> parse_program_options(int argc, char** argv, const std::strin
                                          ProgramOptions& options) {
   CLI::App app{purpose, name};
   app.set_version_flag("--version", IMPRINT_VERSION);
-  app.add_option("--config", options.config, "the config file (TOML)")->required();
+  app.add_option("--config", options.config, "the config file (TOML; docs/configuration.md)")->required();
   app.add_flag("--check", options.check, "check the config and all it names, then stop");
   app.add_flag("--print-config", options.print_config, "print the config with its defaults, then stop");
   // One value each: `--set a.b=1 c.d=2` would otherwise swallow a forgotten --set.
   app.add_option("--set", options.overrides, "override one key: section.key=value")->expected(1)->take_all();
   try {
     app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return app.exit(asked);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    std::cerr << fmt::format("{}: {}; see {} --help\n", name, error.what(), name);
+    return 2;
   }
   return std::nullopt;
 }
@@ -53,7 +56,7 @@ Result<toml::table> read_program_config(const ProgramOptions& options) {
 std::string read_id(TomlReader& read, std::string_view key, std::optional<std::string> fallback) {
   std::string id = read.string(key, std::move(fallback));
   if (read.error()) return id;
-  if (const auto valid = check_id("id", id); !valid) read.fault(key, valid.error().message);
+  if (const auto valid = check_id("", id); !valid) read.fault(key, valid.error().message);
   return id;
 }
 

@@ -324,8 +324,12 @@ Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config) {
     if (config.tool)
       return job_failed("connect endpoint {}: no router reached within {} s: is imprint-fusion running there?",
                         joined(config.connect), kToolTimeoutMs / 1000);
-    return job_failed("Zenoh session (connect [{}], listen [{}]): cannot be opened: {}", joined(config.connect),
-                      joined(config.listen), reason_of(error));
+    const std::string reason = reason_of(error);
+    const bool taken = reason.find("already in use") != std::string::npos;
+    return job_failed(
+        "Zenoh session (connect [{}], listen [{}]): cannot be opened: {}{}", joined(config.connect),
+        joined(config.listen), reason,
+        taken ? "; another program (a second imprint-fusion?) listens there: stop it or change zenoh.listen" : "");
   }
 }
 

@@ -16,8 +16,8 @@ bool is_id_character(char c) {
 Result<void> check_id(std::string_view what, std::string_view id) {
   const bool sized = !id.empty() && id.size() <= kMaxIdBytes;
   if (sized && std::all_of(id.begin(), id.end(), is_id_character) && id.front() != '.' && id.front() != '-') return {};
-  return invalid_input("{} id: expected 1 to {} of A-Z a-z 0-9 . _ -, not beginning with '.' or '-', found '{}'", what,
-                       kMaxIdBytes, wire_line(id, kMaxIdBytes + 16));
+  return invalid_input("{}{}expected 1 to {} of A-Z a-z 0-9 . _ -, not beginning with '.' or '-', found '{}'", what,
+                       what.empty() ? "" : " id: ", kMaxIdBytes, wire_line(id, kMaxIdBytes + 16));
 }
 
 Result<Keys> Keys::of(std::string_view site, std::string_view line) {
