@@ -7,6 +7,7 @@ everything it started.
 """
 import argparse
 import json
+import os
 import pathlib
 import signal
 import socket
@@ -21,8 +22,10 @@ START_TIMEOUT_S = 30
 RESULT_TIMEOUT_S = 120
 
 
-def fail(message):
-    sys.exit(f"demo: {message}")
+def fail(message, status=2):
+    """Ends the demo with one line: status 2 for what was asked for, 1 for a job that could not be done."""
+    print(f"demo: {message}", file=sys.stderr)
+    sys.exit(status)
 
 
 def free_port():
@@ -76,12 +79,14 @@ class Plant:
         while time.monotonic() < deadline:
             for name, process in self.processes.items():
                 if process.poll() is not None:
-                    fail(f"{name} ended with status {process.returncode}; its log: {self.folder / name}.log")
+                    log = (self.folder / f"{name}.log").read_text(encoding="utf-8", errors="replace").split("\n")
+                    said = next((line for line in reversed(log) if line.strip()), "nothing")
+                    fail(f"{name} ended with status {process.returncode} and said: {said}", 1)
             status = imprint("status", "--connect", self.endpoint, "--json")
             if status.returncode == 0 and alive_cameras(json.loads(status.stdout)) >= set(self.cameras):
                 return
             time.sleep(0.2)
-        fail(f"not all cameras came up within {START_TIMEOUT_S} s; the logs are in {self.folder}")
+        fail(f"not all cameras came up within {START_TIMEOUT_S} s; the logs are in {self.folder}", 1)
 
     def measure(self, session, rotations):
         """Triggers every observation and gives the last result."""
@@ -90,7 +95,7 @@ class Plant:
             done = imprint("trigger", "--connect", self.endpoint, "--session", session, "--observation", index,
                            f"--rotation-deg={rotation}", "--expect", len(rotations), "--wait", RESULT_TIMEOUT_S, "--json")
             if done.returncode:
-                fail(f"observation {index}: {done.stderr.strip()}; the logs are in {self.folder}")
+                fail(f"observation {index}: {done.stderr.strip()}; the logs are in {self.folder}", 1)
             print(f"  observation {index} at {rotation:g} deg: trigger to result {time.monotonic() - begin:.2f} s", flush=True)
         return done.stdout
 
@@ -103,8 +108,28 @@ def render(folder, seed):
     print(f"Rendering three observations of the forge scene into {folder} ...", flush=True)
     command = [str(BIN / "imprint"), "simulate", str(ROOT / "simulation" / "scenes" / "forge.toml"), "--seed", str(seed),
                "--observations", "3", "--jobs", "2", "--out", str(folder)]
-    if subprocess.run(command, check=False).returncode:
-        fail("rendering failed")
+    # The progress bar is on stderr; the advice what to do with the frames is for those who only render.
+    if subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode:
+        fail("rendering failed", 1)
+
+
+def wait_for_enter(page):
+    print(f"The page is up at {page} - press Enter to stop", flush=True)
+    sys.stdin.readline()
+
+
+def read_session(folder):
+    """The rig's path, its cameras and the rotations of FOLDER/session.toml; what the programs check is left to them."""
+    file = folder / "session.toml"
+    try:
+        session = tomllib.loads(file.read_text(encoding="utf-8"))
+        file = (folder / session["rig"]).resolve()
+        cameras = [camera["id"] for camera in tomllib.loads(file.read_text(encoding="utf-8"))["camera"]]
+        return file, cameras, [float(observation.get("rotation_deg", 0.0)) for observation in session["observation"]]
+    except (OSError, ValueError) as error:  # ValueError: no TOML, no text, no number
+        fail(f"{file}: {error}")
+    except (KeyError, TypeError, AttributeError) as error:
+        fail(f"{file}: expected what docs/interfaces.md describes; missing or of another kind: {error}")
 
 
 def main():
@@ -118,18 +143,16 @@ def main():
         fail(f"{source}: holds no session.toml; see docs/own_images.md")
     if not (source / "session.toml").is_file():
         render(source, options.seed)
-    with open(source / "session.toml", "rb") as file:
-        session = tomllib.load(file)
-    rig = (source / session["rig"]).resolve()
-    with open(rig, "rb") as file:
-        cameras = [camera["id"] for camera in tomllib.load(file)["camera"]]
-    rotations = [observation.get("rotation_deg", 0.0) for observation in session["observation"]]
+    if not os.access(source, os.W_OK):
+        fail(f"{source}: result, report and logs are written there, but it is read-only; copy it elsewhere")
+    rig, cameras, rotations = read_session(source)
 
     print(f"Starting imprint-fusion and {len(cameras)} imprint-node ...", flush=True)
     name = f"{source.name}-{time.strftime('%Y%m%dT%H%M%S')}"
     with Plant(source, rig, cameras) as plant:
         plant.wait_until_alive()
-        print(f"  page: {plant.page}", flush=True)
+        print(f"  page: {plant.page}" + ("" if options.hold else " (while this runs; --hold keeps it up)"), flush=True)
+        print("  measuring; three nodes and fusion share this machine, so an observation takes some seconds", flush=True)
         result = plant.measure(name, rotations)
         result_file = source / "result.json"
         result_file.write_text(json.dumps(json.loads(result), indent=1) + "\n", encoding="utf-8")
@@ -139,13 +162,17 @@ def main():
             arguments += ["--truth", source / "truth.json"]
         report = imprint(*arguments)
         if report.returncode:
-            fail(report.stderr.strip())
+            fail(report.stderr.strip(), 1)
         print(report.stdout, end="")
         print(f"Result: {result_file}\nReport: {report_file} (to read and print in any browser)\nLogs:   {source}/*.log")
+        print(f"The same without a line: build/bin/imprint measure {source / 'session.toml'}")
         if options.hold:
-            input(f"The page is up at {plant.page} - press Enter to stop ")
+            wait_for_enter(plant.page)
     print("All processes stopped.")
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:  # leaving the context has stopped the processes
+        sys.exit("\ndemo: interrupted; all processes stopped")
