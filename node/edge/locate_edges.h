@@ -16,6 +16,8 @@ struct EdgePoint {
   double direction_deg = 90.0;  ///< gradient direction against the forging axis; 90 = perpendicular
   double sigma_px = 0.0;        ///< expected standard deviation of the offset
   double body_share = 1.0;      ///< step across the edge over that from its outside up to the body's brightness
+  double outside_dip = 0.0;     ///< a strip outside it darker than the background, share of the step (`best`)
+  double outside_bump = 0.0;    ///< a strip outside it brighter than the background, likewise
 };
 
 struct LocatedEnd {

@@ -7,6 +7,7 @@
 
 #include "node/edge/body_brightness.h"
 #include "node/edge/edge_path.h"
+#include "node/edge/outside_level.h"
 #include "node/edge/scan_lines.h"
 #include "node/edge/step_edges.h"
 
@@ -134,6 +135,7 @@ double body_share(const cv::Mat& image, const SilhouetteFrame& frame, const Expe
 struct PlacedEdge {
   double station_px, offset_px, sigma_px;
   float step;
+  OutsideLevel outside;
 };
 
 // Edges at whole stations: between two neighbours on the same stretch of rim, by linear interpolation.
@@ -141,10 +143,11 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
   constexpr double kMaxApartPx = 1.8, kMaxJumpPx = 3.0;
   std::sort(placed.begin(), placed.end(),
             [](const PlacedEdge& a, const PlacedEdge& b) { return a.station_px < b.station_px; });
-  const auto add = [&](int station, double offset, double sigma, float step) {
+  const auto add = [&](int station, double offset, double sigma, float step, const OutsideLevel& outside) {
     if (!out.points.empty() && out.points.back().station_px >= station) return;
     EdgePoint point;
     point.station_px = station, point.offset_px = offset, point.sigma_px = sigma;
+    point.outside_dip = outside.dip, point.outside_bump = outside.bump;
     out.points.push_back(point);
     out.step.push_back(step);
   };
@@ -152,7 +155,7 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
     const PlacedEdge& a = placed[k];
     const double whole = std::round(a.station_px);
     if (std::abs(a.station_px - whole) < 1e-6) {
-      add(static_cast<int>(whole), a.offset_px, a.sigma_px, a.step);
+      add(static_cast<int>(whole), a.offset_px, a.sigma_px, a.step, a.outside);
       continue;
     }
     if (k + 1 == placed.size()) break;
@@ -162,7 +165,7 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
     for (int s = static_cast<int>(std::ceil(a.station_px)); s < b.station_px - 1e-6; ++s) {
       const double t = (s - a.station_px) / apart;
       add(s, a.offset_px + t * (b.offset_px - a.offset_px), std::hypot((1 - t) * a.sigma_px, t * b.sigma_px),
-          static_cast<float>((1 - t) * a.step + t * b.step));
+          static_cast<float>((1 - t) * a.step + t * b.step), t < 0.5 ? a.outside : b.outside);
     }
   }
 }
@@ -187,9 +190,13 @@ RimEdges find_rim_edges(const cv::Mat& image, const SilhouetteFrame& frame, cons
 
   std::vector<PlacedEdge> placed;
   placed.reserve(edges.size());
-  for (const StepEdge& edge : edges) {
+  const std::vector<OutsideLevel> outside =
+      method == EdgeMethod::best ? outside_levels(scan, edges) : std::vector<OutsideLevel>(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const StepEdge& edge = edges[i];
     const ObservedPoint p = scan.at(scan.lines[edge.line], edge.position_px);
-    placed.push_back({frame.station_px(p), frame.offset_px(p), edge.sigma_px, static_cast<float>(edge.step)});
+    placed.push_back(
+        {frame.station_px(p), frame.offset_px(p), edge.sigma_px, static_cast<float>(edge.step), outside[i]});
   }
   RimEdges out;
   place_at_stations(std::move(placed), out);

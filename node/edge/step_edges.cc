@@ -34,13 +34,13 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-// The blur at every traced edge: medians of free fits over regions.
+// The blur of every region of the rim: medians of free fits.
 std::vector<double> regional_blur(const ScanLines& scan, const std::vector<TracedEdge>& traced,
                                   std::size_t region_lines) {
   constexpr double kStartBlur = 1.0;
   constexpr std::size_t kEvery = 8;
-  std::vector<double> blur(traced.size(), kStartBlur), all;
-  std::vector<std::vector<double>> regions(traced.size() / region_lines + 1);
+  std::vector<std::vector<double>> regions((traced.size() + region_lines - 1) / region_lines);
+  std::vector<double> blur(regions.size(), kStartBlur), all;
   for (std::size_t i = 0; i < traced.size(); i += kEvery) {
     Window window;
     auto fit = fit_at(scan, traced[i], 2.0, true, window);
@@ -51,25 +51,82 @@ std::vector<double> regional_blur(const ScanLines& scan, const std::vector<Trace
   }
   if (all.empty()) return blur;
   const double overall = median(all);
-  for (std::size_t r = 0; r < regions.size(); ++r) {
-    const double value = regions[r].size() >= 8 ? median(regions[r]) : overall;
-    for (std::size_t i = r * region_lines; i < std::min(traced.size(), (r + 1) * region_lines); ++i) blur[i] = value;
-  }
+  for (std::size_t r = 0; r < regions.size(); ++r) blur[r] = regions[r].size() >= 8 ? median(regions[r]) : overall;
   return blur;
+}
+
+// The shape of the edge over the traced lines [first, last): their profiles laid on each other by their own fits of a
+// plain step, finer than the pixels since every line meets them elsewhere; medians, so that neither scale nor sparks
+// count.
+EdgeShape shape_of(const ScanLines& scan, const std::vector<TracedEdge>& traced, std::size_t first, std::size_t last,
+                   double blur) {
+  constexpr double kBinsPerPx = 4.0;
+  constexpr int kOutwardPx = 6, kInwardPx = 8;
+  constexpr std::size_t kLeastLines = 40, kLeastInBin = 8;
+  const double outward = kOutwardPx + blur, inward = kInwardPx + blur;
+  std::vector<std::vector<double>> bins(static_cast<std::size_t>((outward + inward) * kBinsPerPx) + 1);
+  std::size_t lines = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    Window window;
+    const auto fit = fit_at(scan, traced[i], blur, false, window);
+    if (!fit) continue;
+    ++lines;
+    const ScanLine& line = scan.lines[traced[i].line];
+    const float* values = scan.samples(line);
+    const double position = window.from + fit->position;
+    for (int k = std::max(0, traced[i].edge.from_sample); k <= std::min(line.count - 1, traced[i].edge.to_sample);
+         ++k) {
+      const double x = k - position;
+      if (x < -outward || x >= inward) continue;
+      bins[static_cast<std::size_t>((x + outward) * kBinsPerPx)].push_back((values[k] - fit->outside) / fit->step);
+    }
+  }
+  if (lines < kLeastLines) return {blur, 0.0};
+  std::vector<ProfilePoint> profile;
+  for (std::size_t b = 0; b < bins.size(); ++b) {
+    if (bins[b].size() < kLeastInBin) continue;
+    const auto count = static_cast<double>(bins[b].size());
+    profile.push_back({(static_cast<double>(b) + 0.5) / kBinsPerPx - outward, median(bins[b]), count});
+  }
+  return fit_shape(profile, blur).value_or(EdgeShape{blur, 0.0});
+}
+
+// The shape at every traced edge: that of its region, on the line between the regions' middles, so that no step comes
+// from where they meet.
+std::vector<EdgeShape> regional_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced,
+                                       std::size_t region_lines) {
+  const std::vector<double> blur = regional_blur(scan, traced, region_lines);
+  std::vector<EdgeShape> regions;
+  for (std::size_t r = 0; r < blur.size(); ++r)
+    regions.push_back(
+        shape_of(scan, traced, r * region_lines, std::min(traced.size(), (r + 1) * region_lines), blur[r]));
+  std::vector<EdgeShape> shapes(traced.size());
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    const double place = std::clamp((static_cast<double>(i) + 0.5) / static_cast<double>(region_lines) - 0.5, 0.0,
+                                    static_cast<double>(regions.size() - 1));
+    const auto r = std::min(static_cast<std::size_t>(place), regions.size() - 1);
+    const EdgeShape &a = regions[r], &b = regions[std::min(r + 1, regions.size() - 1)];
+    const double t = place - static_cast<double>(r);
+    shapes[i] = {(1 - t) * a.blur + t * b.blur, (1 - t) * a.rise + t * b.rise};
+  }
+  return shapes;
 }
 
 }  // namespace
 
 std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
-  const std::vector<double> blur = regional_blur(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
+  if (traced.empty()) return {};
+  const std::vector<EdgeShape> shapes =
+      regional_shapes(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
   std::vector<StepEdge> edges;
   std::vector<double> residuals, own, unit;
   for (std::size_t i = 0; i < traced.size(); ++i) {
-    Window window;
-    const auto fit = fit_at(scan, traced[i], blur[i], false, window);
+    const ScanLine& line = scan.lines[traced[i].line];
+    const Window window = fit_window(line, traced[i], shapes[i].blur);
+    const auto fit = fit_step(scan.samples(line) + window.from, window.count,
+                              traced[i].edge.position_px - line.first_px - window.from, shapes[i]);
     if (!fit) continue;
-    edges.push_back(
-        {traced[i].line, scan.lines[traced[i].line].first_px + window.from + fit->position, 0.0, fit->step});
+    edges.push_back({traced[i].line, line.first_px + window.from + fit->position, 0.0, fit->step, shapes[i].blur});
     own.push_back(fit->residual);
     unit.push_back(fit->sigma_unit);
   }

@@ -11,7 +11,8 @@ struct StepEdge {
   std::size_t line = 0;  ///< index into ScanLines::lines
   double position_px = 0.0;
   double sigma_px = 0.0;
-  double step = 0.0;  ///< share of full scale
+  double step = 0.0;     ///< share of full scale
+  double blur_px = 1.0;  ///< standard deviation, where it was fitted
 };
 
 /// Blurred steps fitted to the traced edges. The blur is first fitted freely on a part of the lines, its median taken

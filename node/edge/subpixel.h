@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 namespace imprint {
 
@@ -14,9 +15,29 @@ struct StepFit {
   double sigma_unit = 0.0;  ///< standard deviation of the position for a noise of 1
 };
 
+/// How a body's brightness goes on behind its rim: a blurred step, and a rise with the square root of the depth, which
+/// is how any law of limb darkening begins on a round body (the cosine of the angle of view grows as that root).
+struct EdgeShape {
+  double blur = 1.0;  ///< standard deviation of the blur, pixel area included, in samples
+  double rise = 0.0;  ///< share of the step, per root of a sample
+};
+
 /// Least-squares fit of outside + step Phi((i - position)/blur) to `count` values: the most likely position under white
 /// noise. `blur` is fitted too when `free_blur`, else kept. Nothing when it does not settle near `start`.
 std::optional<StepFit> fit_step(const float* values, int count, double start, double blur, bool free_blur);
+/// The same for a step of known shape, its rise included.
+std::optional<StepFit> fit_step(const float* values, int count, double start, const EdgeShape& shape);
+
+/// One place of a profile across an edge, averaged over many lines.
+struct ProfilePoint {
+  double x = 0.0;  ///< samples from where the lines' own fits put the edge, inwards
+  double value = 0.0;
+  double weight = 0.0;
+};
+
+/// Blur and rise of an averaged profile, level, step and place being free; nothing when it does not settle. A rise that
+/// is less than three times its uncertainty is taken for none.
+std::optional<EdgeShape> fit_shape(std::span<const ProfilePoint> profile, double start_blur);
 
 /// The position, in samples, at which the second derivative of a rising step near `start` passes zero: the zero of a
 /// line fitted to it over +-`half_width` samples, where it is about straight ([C] 2.3.2 and [38] there). The derivative

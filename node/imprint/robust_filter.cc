@@ -38,6 +38,7 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
 // What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
+  constexpr double kDip = 0.025, kBump = 0.07;             // of the step: half the trust is gone
   RimCurve curve;
   if (points.empty()) return curve;
   curve.reserve(points.size());
@@ -55,8 +56,11 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
     const double by_magnitude = std::min(1.0, p.magnitude / (0.7 * magnitude + 1e-9));
     const double by_direction = std::pow(std::min(1.0, 2.5 * calm_deg / std::max(1e-3, unrest[i])), 2);
     const double excess = std::max(1.0, p.sigma_px / (1.5 * sigma));
-    curve.push_back(
-        {static_cast<double>(p.station_px), p.offset_px, by_body * by_magnitude * by_direction / (excess * excess)});
+    // Scale that is colder than what is behind it, or glows faintly itself, lies between this edge and the true rim.
+    const double by_outside =
+        1.0 / (1.0 + std::pow(p.outside_dip / kDip, 2)) / (1.0 + std::pow(p.outside_bump / kBump, 2));
+    curve.push_back({static_cast<double>(p.station_px), p.offset_px,
+                     by_body * by_magnitude * by_direction * by_outside / (excess * excess)});
   }
   return curve;
 }

@@ -184,6 +184,73 @@ TEST_CASE("edge: the outermost edge is taken where scale shows a weaker rim") {
   CHECK(best.upper.size() > 640);
 }
 
+// A round body of radius 50 px whose radiance falls towards its limb, blurred, its axis 0.6 deg off the rows.
+cv::Mat limb_darkened(const drawn::Body& body, double darkening, unsigned seed) {
+  constexpr double kRadius = 50.0, kFinePx = 0.02;
+  const int reach = static_cast<int>((kRadius + 20) / kFinePx);
+  std::vector<double> sharp(static_cast<std::size_t>(2 * reach + 1)), blurred(sharp.size());
+  for (int i = -reach; i <= reach; ++i) {
+    const double share = std::abs(i * kFinePx) / kRadius;
+    const double facing = share < 1 ? std::sqrt(1 - share * share) : 0.0;
+    sharp[static_cast<std::size_t>(i + reach)] =
+        share < 1 ? body.level * (1 - darkening * (1 - facing)) : body.background;
+  }
+  const int far = static_cast<int>(5 * body.blur_px / kFinePx);
+  for (int i = -reach; i <= reach; ++i) {
+    double sum = 0, weight = 0;
+    for (int k = std::max(-reach, i - far); k <= std::min(reach, i + far); k += 2) {
+      const double z = (k - i) * kFinePx / body.blur_px, w = std::exp(-0.5 * z * z);
+      sum += w * sharp[static_cast<std::size_t>(k + reach)], weight += w;
+    }
+    blurred[static_cast<std::size_t>(i + reach)] = sum / weight;
+  }
+  cv::Mat_<float> image(kSize, static_cast<float>(body.background));
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const double across = body.along_and_across(x, y)[1] - body.middle_px(0);
+      const auto at = static_cast<long>(std::lround(across / kFinePx)) + reach;
+      if (at >= 0 && at < static_cast<long>(blurred.size()))
+        image(y, x) = static_cast<float>(blurred[static_cast<std::size_t>(at)]);
+    }
+  }
+  return drawn::expose(image, 2, seed);
+}
+
+TEST_CASE("edge: limb darkening does not move the rim") {
+  for (const double darkening : {0.0, 0.25, 0.5}) {
+    drawn::Body body = strip(0.9);
+    body.background = 20;
+    body.tilt_rad = 0.01;
+    const cv::Mat image = limb_darkened(body, darkening, 21);
+    const auto found = locate_edges(image, expected(body, -340, 340), Polarity::bright, EdgeMethod::best, {});
+    double outward = 0, count = 0;
+    for (const EdgePoint& e : found.upper) outward += -50 - e.offset_px, ++count;
+    for (const EdgePoint& e : found.lower) outward += e.offset_px - 50, ++count;
+    INFO("darkening " << darkening << ": " << outward / count << " px outwards over " << count << " points");
+    REQUIRE(count > 1200);
+    // A plain step goes 0.1 px and more inwards at 0.5; what is left is the terms after the square root.
+    CHECK(std::abs(outward / count) < 0.035);
+  }
+}
+
+TEST_CASE("edge: scale colder than the background shows as a dip outside its edge, and only there") {
+  drawn::Body body = strip(0.9);
+  body.patches = {{-100, -20, true, 3.5, 25}};  // below the background's 50: the edge is found at its inner border
+  const cv::Mat image = drawn::expose(drawn::draw(body, kSize), 3, 6);
+  const auto found = locate_edges(image, expected(body, -340, 340), Polarity::bright, EdgeMethod::best, {});
+  int hidden = 0, told = 0, plain = 0, alarmed = 0;
+  for (const EdgePoint& p : found.upper) {
+    if (p.station_px > -90 && p.station_px < -30) {
+      ++hidden, told += p.outside_dip > 0.1;
+    } else if (p.station_px < -125 || p.station_px > 5) {
+      ++plain, alarmed += p.outside_dip > 0.025 || p.outside_bump > 0.07;
+    }
+  }
+  REQUIRE(hidden > 40);
+  CHECK(told > 0.9 * hidden);
+  CHECK(alarmed < 0.02 * plain);
+}
+
 TEST_CASE("edge: a beam beside the rim is not taken for its outermost edge") {
   drawn::Body body = strip(0.9);
   cv::Mat_<float> image = drawn::draw(body, kSize);
