@@ -96,26 +96,63 @@ AxisCurve first_axis(const ObservedForging& observed, const Placement& placement
 }
 
 /// Where no tangent tells the radius, such as on a shoulder that no camera sees sharply, it lies on the line between
-/// the nearest sections that are known; the intervals there stay as wide as they are.
+/// the nearest sections that are known, at an end it is that of the nearest; the intervals there stay as wide as they
+/// are.
 void bridge_unknown_radii(JointEstimate& joint) {
   constexpr double kTimesUsual = 8.0, kLeastShare = 0.002;  // of the usual sigma; of the radius
+  constexpr std::size_t kBeside = 2;
+  constexpr double kOutside = 0.01;  // of the radius
   std::vector<double> sigmas;
   for (const NodeMatrix& covariance : joint.covariance) sigmas.push_back(std::sqrt(covariance(kRadius, kRadius)));
   std::vector<double> sorted = sigmas;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
   const double usual = sorted[sorted.size() / 2];
-  const auto known = [&](std::size_t i) {
+  const auto sharp = [&](std::size_t i) {
     return sigmas[i] <= std::max(kTimesUsual * usual, kLeastShare * std::abs(joint.nodes[i](kRadius)));
   };
+  // Beside a stretch nobody sees a section may hang on one tangent, and that one on something else: it has to lie
+  // between its neighbours that do not.
+  std::vector<char> firm(sigmas.size(), 1), known_at(sigmas.size(), 0);
+  for (std::size_t i = 0; i < firm.size(); ++i)
+    for (std::size_t k = i < kBeside ? 0 : i - kBeside; k <= std::min(i + kBeside, sigmas.size() - 1); ++k)
+      if (!sharp(k)) firm[i] = 0;
+  for (std::size_t i = 0; i < firm.size(); ++i) {
+    if (!sharp(i)) continue;
+    const auto next = std::find(firm.begin() + static_cast<std::ptrdiff_t>(i), firm.end(), 1);
+    const auto last = std::find(firm.rend() - static_cast<std::ptrdiff_t>(i) - 1, firm.rend(), 1);
+    double low = joint.nodes[i](kRadius), high = low;
+    if (next != firm.end() && last != firm.rend()) {
+      const double a = joint.nodes[static_cast<std::size_t>(next - firm.begin())](kRadius);
+      const double b = joint.nodes[static_cast<std::size_t>(firm.rend() - last) - 1](kRadius);
+      low = std::min(a, b) - kOutside * a, high = std::max(a, b) + kOutside * a;
+    }
+    known_at[i] = joint.nodes[i](kRadius) >= low && joint.nodes[i](kRadius) <= high;
+  }
+  const auto known = [&](std::size_t i) { return known_at[i] != 0; };
   std::optional<std::size_t> before;
   for (std::size_t i = 0; i < joint.nodes.size(); ++i) {
     if (!known(i)) continue;
-    for (std::size_t k = before ? *before + 1 : i; before && k < i; ++k) {
-      const double t = static_cast<double>(k - *before) / static_cast<double>(i - *before);
-      joint.nodes[k](kRadius) = (1.0 - t) * joint.nodes[*before](kRadius) + t * joint.nodes[i](kRadius);
+    for (std::size_t k = before ? *before + 1 : 0; k < i; ++k) {
+      const std::size_t from = before.value_or(i);  // up to the first known section: its own radius
+      const double t = before ? static_cast<double>(k - from) / static_cast<double>(i - from) : 1.0;
+      joint.nodes[k](kRadius) = (1.0 - t) * joint.nodes[from](kRadius) + t * joint.nodes[i](kRadius);
     }
     before = i;
   }
+  for (std::size_t k = before ? *before + 1 : joint.nodes.size(); k < joint.nodes.size(); ++k)
+    joint.nodes[k](kRadius) = joint.nodes[*before](kRadius);
+}
+
+/// How large a pixel is at the forging, across the line of sight: median over all tangents.
+double mm_per_px(std::span<const ObservedForging> observations) {
+  std::vector<double> scales;
+  for (const ObservedForging& observed : observations)
+    for (const ObservedSection& section : observed.sections)
+      for (const TangentPlane& tangent : section.tangents) scales.push_back(tangent.mm_per_px);
+  if (scales.empty()) return 0.0;
+  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
+  std::nth_element(scales.begin(), middle, scales.end());
+  return *middle;
 }
 
 /// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
@@ -245,7 +282,10 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
     return job_failed("the ends of the observations do not enclose a forging");
   align(*joint, ends, forging.end_section_mm, config.sections, combined);
   combined.length_sigma_mm = ends.length_sigma_mm();
+  // No number of tangents takes away what moves all rims outwards or inwards alike.
+  const double common = 2.0 * config.common_edge_sigma_px * mm_per_px(observations);
   for (CombinedSection& section : combined.sections) {
+    section.diameter_sigma_mm = std::hypot(section.diameter_sigma_mm, common);
     section.axis_covariance_mm2 *= config.interval_widening * config.interval_widening;
     section.diameter_sigma_mm *= config.interval_widening;
     section.circularity_sigma_mm *= config.interval_widening;

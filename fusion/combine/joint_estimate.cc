@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kCameraUnknowns = 2;         // its place across the axis, at both ends
 constexpr int kPlaceUnknowns = 6;          // shift x, y, z and turn about x, y, z of an observation
-constexpr double kTogether = 3.0;          // tangents of a rim that haze and filtering move together
+constexpr double kTogether = 3.0;          // tangents of a rim that haze and filtering move together, at least
 constexpr double kLeastNoise = 0.2;        // of the stated sigma: exact input must not make the equations singular
 constexpr double kLeastOutOfRound = 7e-3;  // of the radius: what a forging may be before it counts as a fault
 constexpr double kFreedom = 4.0;           // of Student's t for the tangents
@@ -98,8 +98,9 @@ class JointSolver {
   std::optional<JointEstimate> run() {
     for (int iteration = 0; iteration < config_.iterations; ++iteration)
       if (!improve(iteration + 1 == config_.iterations)) return std::nullopt;
+    together_ = std::max(kTogether, moved_together());
     std::vector<std::optional<Equation>> equations;
-    if (!solve(SectionPrior::Use::interval, equations)) return std::nullopt;
+    if (!solve(Use::interval, equations)) return std::nullopt;
     JointEstimate estimate;
     estimate.step_mm = step_mm_;
     estimate.nodes = nodes_;
@@ -116,6 +117,8 @@ class JointSolver {
   }
 
  private:
+  enum class Use { estimate, interval };
+
   static double median(std::span<const double> values) {
     std::vector<double> sorted(values.begin(), values.end());
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
@@ -278,12 +281,12 @@ class JointSolver {
   }
 
   /// The equations of this round, solved; false when they cannot be.
-  bool solve(SectionPrior::Use use, std::vector<std::optional<Equation>>& equations) {
+  bool solve(Use use, std::vector<std::optional<Equation>>& equations) {
     const int border =
         static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
     system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
-    prior_.add_to(system_, use);
-    if (use == SectionPrior::Use::estimate) add_start();
+    prior_.add_to(system_);
+    if (use == Use::estimate) add_start();
     add_camera_priors();
     add_place_priors();
     const RodSurface rod(nodes_, step_mm_);
@@ -300,7 +303,7 @@ class JointSolver {
 
   bool improve(bool last) {
     std::vector<std::optional<Equation>> equations;
-    if (!solve(SectionPrior::Use::estimate, equations)) return false;
+    if (!solve(Use::estimate, equations)) return false;
     nodes_ = system_.node_solution;
     camera_solution_ = system_.border_solution.head(camera_solution_.size());
     find_residuals(equations);
@@ -315,7 +318,7 @@ class JointSolver {
   void add_equation(const Row& row, const Equation& equation) {
     const std::size_t i = equation.node;
     const double w =
-        row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * kTogether + equation.extra_variance_mm2);
+        row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * together_ + equation.extra_variance_mm2);
     const double next = equation.share;
     const double here = 1.0 - next;
     const NodeVector& g = equation.coefficients;
@@ -413,6 +416,37 @@ class JointSolver {
     return bends.empty() ? 1.0 : 1.4826 * median(bends) / std::sqrt(6.0);
   }
 
+  /// How many neighbouring tangents of a rim count as one: the sum of their residuals' likeness over all distances, out
+  /// to where none is left. Counted so, a rim that hot air bends over tens of px says no more than it knows.
+  double moved_together() const {
+    constexpr std::size_t kFurthest = 120;  // stations
+    constexpr double kNone = 0.05, kMost = 2.5;
+    double squares = 0.0, count = 0.0;
+    // What belongs to something else is no measure of what moves the rims.
+    const auto size_of = [&](const Row& row) {
+      return std::clamp(row.residual_mm * std::sqrt(row.trust / row.variance_mm2) / noise_scale_, -kMost, kMost);
+    };
+    for (const Row& row : rows_) {
+      if (!row.used) continue;
+      squares += size_of(row) * size_of(row), count += 1.0;
+    }
+    if (!(squares > 0.0)) return 1.0;
+    double sum = 1.0;
+    for (std::size_t lag = 1; lag < kFurthest; lag += 1 + lag / 8) {
+      double products = 0.0, pairs = 0.0;
+      std::size_t run = 0;  // rows of the same rim up to this one
+      for (std::size_t r = 0; r < rows_.size(); ++r) {
+        run = rows_[r].continues ? run + 1 : 0;
+        if (run < lag || !rows_[r].used || !rows_[r - lag].used) continue;
+        products += size_of(rows_[r]) * size_of(rows_[r - lag]), pairs += 1.0;
+      }
+      const double likeness = pairs > 0.0 ? products / pairs / (squares / count) : 0.0;
+      if (likeness < kNone) break;
+      sum += 2.0 * likeness * static_cast<double>(1 + lag / 8);
+    }
+    return sum;
+  }
+
   /// Whom to trust in the next round.
   void weigh(std::span<const std::optional<Equation>> equations) {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
@@ -445,6 +479,7 @@ class JointSolver {
   std::vector<std::pair<double, double>> radius_range_;  ///< about each node, of the start
   std::vector<Vector6d> place_sum_;
   Eigen::VectorXd camera_solution_;
+  double together_ = kTogether;   ///< tangents of a rim that are moved together
   double noise_scale_ = 0.0;      ///< of the stated sigmas; found in the first round
   double out_of_round_mm_ = 0.0;  ///< robust sigma of the tangents about the circles
 };

@@ -9,10 +9,6 @@ namespace {
 /// Shape of the spectrum while only its size can be learnt: sigma falls as 1/k.
 double spectrum(int k) { return static_cast<double>(kFirstHarmonic) / k; }
 
-/// The process forgets sharply, a forging smoothly: weights made for the process lean on the ends of every stretch
-/// between two shoulders. For the estimate a shorter length keeps them even; the interval takes the whole.
-constexpr double kEstimateShare = 0.3;
-
 constexpr double kLeastBend = 2e-4;
 
 /// Precision of one step of an integrated random walk (value, slope) with unit density.
@@ -50,15 +46,14 @@ SectionPrior::SectionPrior(std::vector<double> unseen_step_mm, double step_mm, d
     harmonic_sigma_mm_[static_cast<std::size_t>(k - kFirstHarmonic)] = out_of_round_share * radius_mm * spectrum(k);
 }
 
-void SectionPrior::add_to(BorderedSystem& system, Use use) const {
+void SectionPrior::add_to(BorderedSystem& system) const {
   const int n = system.nodes();
   const Eigen::Matrix2d bend = bend_precision(step_mm_) / bend_density_;
   Eigen::Matrix2d advance;
   advance << 1.0, step_mm_, 0.0, 1.0;
   const Eigen::Matrix2d bend_own = advance.transpose() * bend * advance;
   const Eigen::Matrix2d bend_cross = -advance.transpose() * bend;
-  const double length = use == Use::interval ? harmonic_length_mm_ : kEstimateShare * harmonic_length_mm_;
-  const double keep = std::exp(-step_mm_ / length);
+  const double keep = std::exp(-step_mm_ / harmonic_length_mm_);
   for (int i = 0; i < n; ++i) {
     const auto k = static_cast<std::size_t>(i);
     NodeMatrix& own = system.diagonal[k];
@@ -143,7 +138,7 @@ double SectionPrior::shape_length_mm(std::span<const NodeVector> nodes) const {
   // that it would seem never to change.
   constexpr double kLikeness = 0.6;
   const std::size_t n = nodes.size();
-  const double longest = 0.25 * length_mm_;
+  const double longest = 0.5 * length_mm_;
   for (std::size_t lag = 1; lag < n / 2; lag += 1 + lag / 4) {
     double together = 0.0;
     double alone = 0.0;

@@ -29,8 +29,7 @@ class SectionPrior {
   SectionPrior(std::vector<double> unseen_step_mm, double step_mm, double radius_mm, double out_of_round_share,
                double out_of_round_length_mm);
 
-  enum class Use { estimate, interval };
-  void add_to(BorderedSystem& system, Use use) const;
+  void add_to(BorderedSystem& system) const;
 
   /// Learns the amounts from estimates and their covariances (expectation maximisation). `observations` says how far
   /// the harmonics can be told apart: below three, their spectrum keeps its shape and only its size is learnt.

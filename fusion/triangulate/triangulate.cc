@@ -55,6 +55,7 @@ std::vector<ObservedSection> sections_of(const RodConsensus& rod, std::span<cons
     sections[nearest].tangents.push_back({.normal_world = tangent.contact.normal,
                                           .offset_mm = tangent.contact.offset_mm,
                                           .sigma_mm = config.edge_sigma_px * tangent.mm_per_px,
+                                          .mm_per_px = tangent.mm_per_px,
                                           .weight = tangent.weight,
                                           .camera = views[tangent.view].camera,
                                           .upper = tangent.upper,

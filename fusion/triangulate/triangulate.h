@@ -19,12 +19,13 @@ struct TriangulateConfig;  // in triangulate_config.h
 struct TangentPlane {
   Eigen::Vector3d normal_world = Eigen::Vector3d::UnitY();
   double offset_mm = 0.0;
-  double sigma_mm = 0.0;  ///< of the offset
-  double weight = 1.0;    ///< 0 to 1, from the imprint
-  int camera = 0;         ///< index into `cameras` of the observation
-  bool upper = false;     ///< which rim of that camera
-  bool stray = false;     ///< too far from what most rims agree on to have a say before the rod is known better
-  double s_mm = 0.0;      ///< where along the observation's straight line the plane touches
+  double sigma_mm = 0.0;   ///< of the offset
+  double mm_per_px = 0.0;  ///< scale across the ray where it touches
+  double weight = 1.0;     ///< 0 to 1, from the imprint
+  int camera = 0;          ///< index into `cameras` of the observation
+  bool upper = false;      ///< which rim of that camera
+  bool stray = false;      ///< too far from what most rims agree on to have a say before the rod is known better
+  double s_mm = 0.0;       ///< where along the observation's straight line the plane touches
   Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();  ///< from the camera's centre to the rim point, length 1
 };
 
