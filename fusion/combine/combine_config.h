@@ -14,7 +14,7 @@ struct CombineConfig {
   double out_of_round_share = 0.005;        ///< first guess of the harmonics' sigma at k = 2, of the radius (ours)
   double out_of_round_length_share = 0.05;  ///< first guess of how far they keep their shape, of the length (ours)
   double common_edge_sigma_px = 0.07;       ///< of all rims, outwards together: what edge models leave (ours)
-  double interval_widening = 1.4;           ///< of all sigmas: the amounts they rest on are estimates themselves (ours)
+  double interval_widening = 1.2;           ///< of all sigmas: the amounts they rest on are estimates themselves (ours)
   double max_length_difference_mm = 10.0;   ///< between observations, above which a warning is given (ours)
 
   [[nodiscard]] Result<void> validate() const;
