@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "cli/brightened.h"
 #include "cli/command.h"
 #include "lib/config/atomic_file.h"
 #include "node/capture/image_file.h"
@@ -38,12 +39,10 @@ nlohmann::json end_json(const Segmentation& frame, const LocatedEnd& end) {
   return {{"x_px", p.x_px}, {"y_px", p.y_px}, {"sigma_px", end.sigma_px}, {"visible", end.visible}};
 }
 
-// The frame in grey, with the rims from red (weight 0) to green (weight 1), the axis in blue, and the visible ends.
+// The frame, brightened, with the rims from red (weight 0) to green (weight 1), the axis in blue, and the visible ends.
 Result<void> draw(const cv::Mat& image, const FilteredSilhouette& silhouette, const std::filesystem::path& path) {
   constexpr int kShift = 4;  // drawing in 1/16 px
-  cv::Mat grey, picture;
-  image.convertTo(grey, CV_8U, image.depth() == CV_16U ? 1.0 / 256.0 : 1.0);
-  cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
+  const cv::Mat picture = brightened(image);
   const auto at = [&](double station_px, double offset_px) {
     const ObservedPoint p = observed(silhouette.frame, station_px, offset_px);
     return cv::Point(cvRound(p.x_px * (1 << kShift)), cvRound(p.y_px * (1 << kShift)));
@@ -122,8 +121,9 @@ void add_edges_command(Cli& cli) {
   command->add_option("--camera-id", options->camera_id, "the camera of the rig that took the image")->required();
   command->add_option("--method", options->method, "best, orientation, magnitude, combined, uniform, none or pixel")
       ->capture_default_str();
-  command->add_option("--debug-image", options->debug_image,
-                      "write the image with curves (red: not trusted) and ends here, PNG");
+  command->add_option(
+      "--debug-image", options->debug_image,
+      "PNG to write: the image, brightened, with the rims (green: trusted, red: not), the axis and the ends");
   command->add_option("image", options->image, "PNG or TIFF")->required();
 }
 

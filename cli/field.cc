@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "cli/command.h"
+#include "cli/command_line.h"
 #include "lib/targets/coordinate_list.h"
 
 namespace imprint {
@@ -34,11 +35,11 @@ void add_field_command(Cli& cli) {
   command->add_option("--out", options->out, "field.csv to write")->required();
   command->add_option("--columns", options->format.columns, "its columns: id, x, y, z, sigma; others are skipped")
       ->capture_default_str();
-  command->add_option("--skip-lines", options->format.skip_lines, "lines before the first row")
-      ->check(CLI::NonNegativeNumber);
+  command->add_option("--skip-lines", options->format.skip_lines, "lines before the first row")->check(between(0, 1e6));
   const std::map<std::string, double> units{{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}};
   command->add_option("--unit", options->format.mm_per_unit, "mm, cm, m or in")
       ->transform(CLI::CheckedTransformer(units).description(""))
+      ->type_name("UNIT")
       ->default_str("mm");
 }
 

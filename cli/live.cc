@@ -6,6 +6,7 @@
 #include <set>
 
 #include "cli/command.h"
+#include "cli/command_line.h"
 #include "cli/line_link.h"
 #include "cli/result_table.h"
 #include "fusion/results/measurement.h"
@@ -44,7 +45,9 @@ std::string joined(const json& names) {
 void print_camera(const json& camera) {
   std::cout << fmt::format("  {:<12} {:<14}", camera["id"].get<std::string>(),
                            camera["alive"].get<bool>() ? "connected" : "NOT CONNECTED");
-  if (const json& health = camera["health"]; health.is_object()) {
+  if (const json& health = camera["health"]; health.is_object() && health["frames"] == 0) {
+    std::cout << fmt::format("no frame taken yet, heard {:.0f} s ago", health["age_s"].get<double>());
+  } else if (health.is_object()) {
     std::cout << fmt::format("{:>3} targets, reprojection rms {:.3f} px, {} frames ({} failed), heard {:.0f} s ago",
                              health["targets_seen"].get<int>(), health["reprojection_rms_px"].get<double>(),
                              health["frames"].get<std::uint64_t>(), health["failed_frames"].get<std::uint64_t>(),
@@ -63,8 +66,10 @@ void print_status(const json& status) {
   if (const json& session = status["session"]; session.is_object()) {
     const auto settled =
         std::ranges::count_if(session["observations"], [](const json& o) { return o["settled"].get<bool>(); });
-    std::cout << fmt::format("session {}: {} of {} observations in, {}\n", session["session"].get<std::string>(),
-                             settled, session["observations_expected"].get<int>(),
+    const int expected = session["observations_expected"].get<int>();
+    std::cout << fmt::format("session {}: {} {}, {}\n", session["session"].get<std::string>(), settled,
+                             expected > 0 ? fmt::format("of {} observations in", expected)
+                                          : "observations in, their number not stated (trigger --expect)",
                              session["complete"].get<bool>() ? "complete" : "not complete");
   }
   if (const json& last = status["last_result"]; last.is_object()) {
@@ -261,10 +266,11 @@ Result<void> send(const LineLink& link, Publisher& publisher, const Trigger& tri
 // Fusion's result once it holds the observation; the error names the cameras that have not reported.
 Result<json> await_result(const LineLink& link, const Trigger& trigger, steady_clock::time_point until,
                           const std::function<void(milliseconds)>& sleep) {
-  json waiting;
+  json waiting, alarms;
   while (steady_clock::now() < until) {
     const auto status = link.ask("status", "", kAskTimeout);
     if (!status) return pass_on(status.error());
+    alarms = (*status)["alarms"];
     const json state = observation_state(*status, trigger);
     const bool settled = state.is_object() && state["settled"].get<bool>();
     if (state.is_object()) waiting = state["waiting"];
@@ -275,8 +281,10 @@ Result<json> await_result(const LineLink& link, const Trigger& trigger, steady_c
     }
     sleep(kPoll);
   }
-  return job_failed("session {} observation {}: no result in time; {}", trigger.session, trigger.observation,
-                    waiting.empty() ? "fusion did not say who is missing" : "no imprint of " + joined(waiting));
+  std::string why =
+      waiting.empty() ? "all cameras have reported, fusion is not ready with it" : "no imprint of " + joined(waiting);
+  for (const json& alarm : alarms) why += "; ALARM " + alarm["text"].get<std::string>();
+  return job_failed("session {} observation {}: no result in time; {}", trigger.session, trigger.observation, why);
 }
 
 int print_result(const json& session_result, bool as_json) {
@@ -288,7 +296,7 @@ int print_result(const json& session_result, bool as_json) {
   if (as_json) return print_json(session_result["result"]);
   const auto measurement = measurement_from_json(session_result["result"]);
   if (!measurement) return fail(measurement.error());
-  std::cout << result_table(*measurement);
+  std::cout << result_table(*measurement) << warning_lines(*measurement);
   return 0;
 }
 
@@ -346,18 +354,18 @@ void add_live_commands(Cli& cli) {
       [&cli, status_options] { return run_status(status_options->line, status_options->timeout_s, cli.json); });
   add_line_options(*status, status_options->line);
   status->add_option("--timeout", status_options->timeout_s, "s to wait for fusion")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(between(0.1, 3600))
       ->capture_default_str();
 
   auto watch_options = std::make_shared<WatchOptions>();
   CLI::App* watch = cli.command(cli.app, "watch", "prints triggers, imprints and results as they come, until Ctrl-C",
                                 [&cli, watch_options] { return run_watch(*watch_options, cli.json); });
   add_line_options(*watch, watch_options->line);
-  watch->add_option("--count", watch_options->count, "end after this many events")->check(CLI::Range(1, 1'000'000'000));
+  watch->add_option("--count", watch_options->count, "end after this many events")->check(between(1, 1e9));
   watch
       ->add_option("--timeout", watch_options->timeout_s,
                    "end after this many s; exit status 1 when --count was not reached")
-      ->check(CLI::Range(0.1, 1e9));
+      ->check(between(0.1, 1e9));
   watch->add_flag("--results", watch_options->results_only, "only results");
 
   auto trigger_options = std::make_shared<TriggerOptions>();
@@ -365,15 +373,14 @@ void add_live_commands(Cli& cli) {
                                   [&cli, trigger_options] { return run_trigger(*trigger_options, cli.json); });
   add_line_options(*trigger, trigger_options->line);
   trigger->add_option("--session", trigger_options->trigger.session, "name of this forging's measurement")->required();
-  trigger->add_option("--observation", trigger_options->trigger.observation, "index, from 0")
-      ->check(CLI::Range(0, 1'000'000));
+  trigger->add_option("--observation", trigger_options->trigger.observation, "index, from 0")->check(between(0, 1e6));
   trigger->add_option("--rotation-deg", trigger_options->trigger.rotation_deg, "of the forging about its axis")
-      ->check(CLI::Range(-3600.0, 3600.0));
+      ->check(between(-3600, 3600));
   trigger->add_option("--expect", trigger_options->trigger.observations_expected, "observations this session will have")
-      ->check(CLI::Range(1, 1'000'000));
+      ->check(between(1, 1e6));
   trigger
       ->add_option("--wait", trigger_options->wait_s, "s to wait for the result; exit status 1 when it does not come")
-      ->check(CLI::Range(0.1, 86'400.0));
+      ->check(between(0.1, 86'400));
 }
 
 }  // namespace imprint

@@ -1,4 +1,5 @@
 #include "cli/command.h"
+#include "cli/command_line.h"
 
 int main(int argc, char** argv) {
   imprint::Cli cli;
@@ -15,11 +16,7 @@ int main(int argc, char** argv) {
   imprint::add_report_command(cli);
   imprint::add_simulate_command(cli);
   imprint::add_live_commands(cli);
-  try {
-    cli.app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return cli.app.exit(error) == 0 ? 0 : 2;
-  }
+  if (const auto status = imprint::parse_command_line(cli.app, argc, argv)) return *status;
   try {
     return cli.run();
   } catch (const std::exception& error) {  // a fault of ours or of a library: still one line, never a crash

@@ -56,7 +56,7 @@ int run_report(const ReportOptions& options, bool as_json) {
     truth = std::move(*comparison);
   }
   const TruthComparison* compared = truth ? &*truth : nullptr;
-  const std::string table = result_table(*measurement, compared);
+  const std::string table = result_table(*measurement, compared) + warning_lines(*measurement);
   if (!options.out.empty()) {
     const std::string report = *form == Form::page ? report_page(*measurement, read->document, compared) : table;
     if (auto written = write_file_atomically(options.out, report); !written) return fail(written.error());

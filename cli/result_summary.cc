@@ -29,7 +29,7 @@ std::vector<ResultRow> summarize(const Measurement& m, const TruthComparison* tr
   const auto [thin, thick] = std::ranges::minmax_element(m.sections, {}, &Section::diameter_mm);
   return {{"length, mm", m.length_mm, m.length_ci95_mm, known(&TruthComparison::length_mm)},
           {"largest deflection, mm", m.max_deflection_mm, bent.axis_ci95_mm, known(&TruthComparison::max_deflection_mm),
-           fmt::format("at {:.0f} mm from the first end, direction {:.0f} deg", m.max_deflection_at_mm,
+           fmt::format("at {:.0f} mm from the first end, direction {:.0f} deg (from +y to +z)", m.max_deflection_at_mm,
                        m.max_deflection_direction_deg)},
           {"smallest diameter, mm", thin->diameter_mm, thin->diameter_ci95_mm, known(&TruthComparison::diameter_min_mm),
            place(*thin)},

@@ -46,4 +46,10 @@ std::string result_table(const Measurement& m, const TruthComparison* truth) {
   return text;
 }
 
+std::string warning_lines(const Measurement& m) {
+  std::string text;
+  for (const std::string& warning : m.warnings) text += fmt::format("  warning: {}\n", warning);
+  return text;
+}
+
 }  // namespace imprint

@@ -7,8 +7,11 @@
 
 namespace imprint {
 
-/// The result for a person at a terminal; with `truth`, the truth and the errors stand beside it.
+/// The result for a person at a terminal; with `truth`, the truth and the errors stand beside it. Without the warnings.
 std::string result_table(const Measurement& measurement, const TruthComparison* truth = nullptr);
+
+/// The warnings of the result, a line each: why a camera was left out, what is not to be trusted.
+std::string warning_lines(const Measurement& measurement);
 
 /// One sentence: how far the sections are from the truth.
 std::string truth_text(const Measurement& measurement, const TruthComparison& truth);

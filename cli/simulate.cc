@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/command_line.h"
 #include "simulation/scene.h"
 #include "simulation/simulation.h"
 
@@ -76,9 +77,9 @@ void add_simulate_command(Cli& cli) {
   command->add_option("scene", options->scene, "scene file (docs/scene.md)")->required();
   command->add_option("--out", options->folder, "folder for images, rig, session and truth; made if need be")
       ->required();
-  command->add_option("--jobs", options->jobs, "frames rendered at a time")->check(CLI::Range(1, 256));
+  command->add_option("--jobs", options->jobs, "frames rendered at a time")->check(between(1, 256));
   command->add_option("--observations", options->observations, "only the first so many of the scene's observations")
-      ->check(CLI::PositiveNumber);
+      ->check(between(1, 1000));
   command->add_option("--seed", options->seed, "another forging, hall and noise: overrides the scene's seed");
 }
 

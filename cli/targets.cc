@@ -218,7 +218,8 @@ void add_detect(Cli& cli, CLI::App& targets) {
   command
       ->add_option("--decoder", options->config.decoder,
                    "likelihood, or plain: thresholds and no error correction, for comparison")
-      ->transform(CLI::CheckedTransformer(decoders).description(""));
+      ->transform(CLI::CheckedTransformer(decoders).description(""))
+      ->type_name("NAME");
   command->add_option(
       "--debug-image", options->debug_image,
       "PNG to write: what was found, and what was rejected and why; a folder takes one PNG for each image");
