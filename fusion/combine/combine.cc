@@ -155,6 +155,25 @@ double mm_per_px(std::span<const ObservedForging> observations) {
   return *middle;
 }
 
+/// Names the stretches, longer than a shoulder is, over which no rim tells the diameter.
+void warn_of_unseen(CombinedForging& combined) {
+  constexpr double kUnknown = 0.025;  // sigma, of the diameter
+  constexpr double kLong = 0.03;      // of the length
+  const auto& sections = combined.sections;
+  const auto is_unknown = [&](std::size_t i) {
+    return sections[i].diameter_sigma_mm > kUnknown * sections[i].diameter_mm;
+  };
+  for (std::size_t from = 0; from < sections.size(); ++from) {
+    std::size_t to = from;
+    while (to < sections.size() && is_unknown(to)) ++to;
+    if (to > from && sections[to - 1].s_mm - sections[from].s_mm > kLong * combined.length_mm)
+      combined.warnings.push_back(fmt::format(
+          "no camera sees the rims between {:.0f} and {:.0f} mm: the diameters there are only what lies beside them",
+          sections[from].s_mm, sections[to - 1].s_mm));
+    from = to;
+  }
+}
+
 /// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
 void align(const JointEstimate& joint, const EndPlanes& ends, double end_section_mm, int sections,
            CombinedForging& combined) {
@@ -300,6 +319,7 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
   if (beyond > 0)
     combined.warnings.push_back(fmt::format("{} sections lie outside the rig's diameters of {:.0f} to {:.0f} mm",
                                             beyond, forging.diameter_min_mm, forging.diameter_max_mm));
+  warn_of_unseen(combined);
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const double own = (observations[k].end_world_mm - observations[k].start_world_mm).norm();
     if (std::abs(own - combined.length_mm) > config.max_length_difference_mm)

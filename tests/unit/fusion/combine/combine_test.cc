@@ -345,6 +345,30 @@ TEST_CASE("combine: scale over 15 % of every rim leaves 0.5 mm of axis and 0.5 m
   }
 }
 
+TEST_CASE("combine: an end whose rims nobody sees has wide intervals, which hold a hidden shoulder, and a warning") {
+  Rod rod = bent_rod();
+  rod.radius = [](double x) { return 105.0 + 25.0 * std::clamp((x - 150.0) / 17.0, 0.0, 1.0); };
+  Session session = observe(rod, {.noise_px = 0.1});
+  constexpr std::size_t hidden = 55;  // of 500 stations: some 200 mm
+  for (Imprint& imprint : session.imprints[0]) {
+    for (ImprintCurve* curve :
+         {&imprint.upper, &imprint.lower, &imprint.axis}) {  // at either end: cameras face each other
+      std::fill(curve->weight.begin(), curve->weight.begin() + hidden, 0.0);
+      std::fill(curve->weight.end() - hidden, curve->weight.end(), 0.0);
+    }
+  }
+  const auto measured = measure(session);
+  REQUIRE(measured.has_value());
+  CHECK(std::any_of(measured->warnings.begin(), measured->warnings.end(), [](const std::string& warning) {
+    return warning.find("no camera sees the rims between 0 and") != std::string::npos;
+  }));
+  for (const Measurement::Section& section : measured->sections) {
+    INFO("at " << section.s_mm << " mm: " << section.diameter_mm << " +- " << section.diameter_ci95_mm);
+    if (section.s_mm < 100.0) CHECK(std::abs(section.diameter_mm - 210.0) < section.diameter_ci95_mm);
+    if (section.s_mm > 250.0 && section.s_mm < 1650.0) CHECK(section.diameter_ci95_mm < 5.0);
+  }
+}
+
 TEST_CASE("combine: the 95 % intervals cover the truth of one observation in 90 to 100 % of the sections") {
   // Twelve rods of different out-of-round, edges of 0.1 px, poses of 0.3 mm. The out-of-round is the larger part.
   Deviation sum;
