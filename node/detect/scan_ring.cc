@@ -14,7 +14,8 @@ namespace imprint {
 namespace {
 
 constexpr int rows = 7;
-constexpr int neglected = 4;  // columns at each end of a bit, "Neg" of [A] 2.3.5
+constexpr int middle_row = rows / 2;  // as many rows lie on either side of it
+constexpr int neglected = 4;          // columns at each end of a bit, "Neg" of [A] 2.3.5
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0); }
@@ -58,7 +59,7 @@ Columns scan_columns(const GreyImage& level, int l, const FittedDot& dot, int co
       if (!level.contains(p)) continue;
       const double grey = level.at(p);
       sum += grey;
-      if (row != rows / 2) step += row > rows / 2 ? grey : -grey;
+      if (row != middle_row) step += row > middle_row ? grey : -grey;
       ++inside;
     }
     const auto reading_at = [&](double radius) {
@@ -69,7 +70,7 @@ Columns scan_columns(const GreyImage& level, int l, const FittedDot& dot, int co
     scanned.outside.push_back(reading_at(outside_radius(geometry)));
     // At the border of the image the inner rows may still tell.
     scanned.means.push_back(inside == 0 ? nowhere : (sum / inside - dot.black) / dot.contrast);
-    scanned.steps.push_back(inside < rows ? nowhere : step / (rows / 2) / dot.contrast);
+    scanned.steps.push_back(inside < rows ? nowhere : step / middle_row / dot.contrast);
   }
   return scanned;
 }
@@ -130,12 +131,12 @@ BitResponse response_at(const FittedDot& dot, int bits, const TargetGeometry& ge
     response.radial += (normal_cdf((outer - r) / radial_sigma) - normal_cdf((inner - r) / radial_sigma)) / rows;
     const double from_dot = normal_cdf((1.0 - r) / radial_sigma);
     response.floor += from_dot / rows;
-    if (row != rows / 2) response.step += (row > rows / 2 ? from_dot : -from_dot) / (rows / 2);
+    if (row != middle_row) response.step += (row > middle_row ? from_dot : -from_dot) / middle_row;
   }
   response.inside = normal_cdf(-from_ring / radial_sigma) + normal_cdf((1.0 - inside_radius(geometry)) / radial_sigma);
   response.outside = normal_cdf(-from_ring / radial_sigma);
   response.own = 0.0;
-  response.angular_sigma = along_sigma / row_radius(geometry, rows / 2) / bit_angle;
+  response.angular_sigma = along_sigma / row_radius(geometry, middle_row) / bit_angle;
   constexpr int steps = 5;
   for (int i = 0; i < steps; ++i) {
     const double at = half_used * (2.0 * (i + 0.5) / steps - 1.0);
@@ -193,7 +194,7 @@ std::optional<RingScan> scan_ring(const GreyImage& image, int level, const Fitte
     const std::size_t begin = first + static_cast<std::size_t>(bit) * columns_per_bit;
     scan.reading.push_back(read_bit(columns, begin).mean);
     const double angle = two_pi * (static_cast<double>(begin) + 0.5 * columns_per_bit) / count;
-    scan.place.push_back(row_radius(geometry, rows / 2) * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    scan.place.push_back(row_radius(geometry, middle_row) * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     scan.response.push_back(response_at(scanned, bits, geometry, angle));
   }
   set_light(scan, light_slope(dot), 1.0);
