@@ -49,7 +49,8 @@ class BorderedSystem {
   std::vector<NodeMatrix> factor_;   // L of each pivot block
   std::vector<NodeMatrix> coupled_;  // L^-1 (i, i + 1)
   Eigen::MatrixXd border_effect_;    // inverse of the chain times border
-  Eigen::LLT<Eigen::MatrixXd> schur_;
+  // Of anything, so that a system can be moved before it is solved: an empty one has a state that is no value.
+  Eigen::LLT<Eigen::MatrixXd> schur_{Eigen::MatrixXd::Identity(1, 1)};
 };
 
 }  // namespace imprint
