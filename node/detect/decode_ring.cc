@@ -175,14 +175,11 @@ RingDecoder::RingDecoder(const TargetLibrary& library, double max_unknown)
       min_distance_(smallest_distance(library.codes, library.bits)),
       codes_(library.codes) {
   least_white_ = bits_;
-  most_white_ = 0;
   for (const TargetCode& code : codes_) {
     least_white_ = std::min(least_white_, std::popcount(code.code));
-    most_white_ = std::max(most_white_, std::popcount(code.code));
   }
   const int correctable = (min_distance_ - 1) / 2;
   least_white_ = std::max(0, least_white_ - correctable);
-  most_white_ = std::min(bits_, most_white_ + correctable);
 }
 
 struct RingDecoder::Match {

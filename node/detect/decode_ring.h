@@ -43,10 +43,8 @@ class RingDecoder {
   /// it is in the library as read. No error is corrected, none is noticed.
   [[nodiscard]] DecodedRing decode_plainly(const RingScan& scan) const;
 
-  /// Fewest and most white bits of a ring that could be accepted.
+  /// Fewest white bits of a ring that could be accepted.
   [[nodiscard]] int least_white() const { return least_white_; }
-  [[nodiscard]] int most_white() const { return most_white_; }
-  [[nodiscard]] int min_distance() const { return min_distance_; }
 
  private:
   struct Match;
@@ -61,7 +59,6 @@ class RingDecoder {
   double max_unknown_;
   int min_distance_;
   int least_white_;
-  int most_white_;
   std::vector<TargetCode> codes_;
 };
 
