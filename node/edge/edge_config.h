@@ -7,7 +7,7 @@ namespace imprint {
 /// How edges are found on the scan lines.
 struct EdgeConfig {
   double search_outward_px = 22.0;  // from the expected rim away from the body: rim scale hides the true rim; ours
-  double search_inward_px = 20.0;   // into the body; ours
+  double search_inward_px = 40.0;   // into the body; ours
   double scan_spacing_px = 0.5;     // of the paper's methods, [C] 2.3.2
   double min_peak_width_px = 1.0;   // narrowest peak of the first derivative taken as an edge; ours
   double peak_noise_factor = 4.5;   // its height in standard deviations of the derivative's noise; ours

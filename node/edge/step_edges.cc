@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "node/edge/level_slopes.h"
 #include "node/edge/subpixel.h"
 
 namespace imprint {
@@ -12,8 +13,8 @@ namespace {
 struct Window {
   int from = 0, count = 0;
 };
-Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur) {
-  const int reach = std::clamp(static_cast<int>(std::ceil(3.5 * blur + 2.5)), 4, 12);
+Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur, double spare_px) {
+  const int reach = std::clamp(static_cast<int>(std::ceil(2.5 * blur + 1.5 + spare_px)), 3, 12);
   const int middle = static_cast<int>(std::lround(traced.edge.position_px - line.first_px));
   const int from = std::max({0, middle - reach, std::min(traced.edge.from_sample, middle - 2)});
   const int to = std::min({line.count - 1, middle + reach, std::max(traced.edge.to_sample, middle + 2)});
@@ -23,7 +24,7 @@ Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur) {
 std::optional<StepFit> fit_at(const ScanLines& scan, const TracedEdge& traced, double blur, bool free_blur,
                               Window& window) {
   const ScanLine& line = scan.lines[traced.line];
-  window = fit_window(line, traced, blur);
+  window = fit_window(line, traced, blur, 0.0);
   return fit_step(scan.samples(line) + window.from, window.count, traced.edge.position_px - line.first_px - window.from,
                   blur, free_blur);
 }
@@ -114,28 +115,63 @@ std::vector<EdgeShape> regional_shapes(const ScanLines& scan, const std::vector<
 
 }  // namespace
 
-std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
-  if (traced.empty()) return {};
-  const std::vector<EdgeShape> shapes =
-      regional_shapes(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
+namespace {
+
+struct StepFits {
   std::vector<StepEdge> edges;
-  std::vector<double> residuals, own, unit;
+  std::vector<FittedLine> lines;  // of the edges, in their order
+};
+
+// Steps of known shapes fitted to `spare_px` more on either side than the blur needs.
+StepFits fit_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced, const std::vector<EdgeShape>& shapes,
+                    double spare_px) {
+  StepFits fits;
   for (std::size_t i = 0; i < traced.size(); ++i) {
     const ScanLine& line = scan.lines[traced[i].line];
-    const Window window = fit_window(line, traced[i], shapes[i].blur);
+    const Window window = fit_window(line, traced[i], shapes[i].blur, spare_px);
     const auto fit = fit_step(scan.samples(line) + window.from, window.count,
                               traced[i].edge.position_px - line.first_px - window.from, shapes[i]);
     if (!fit) continue;
-    edges.push_back({traced[i].line, line.first_px + window.from + fit->position, 0.0, fit->step, shapes[i].blur});
-    own.push_back(fit->residual);
-    unit.push_back(fit->sigma_unit);
+    fits.edges.push_back({traced[i].line, line.first_px + window.from + fit->position, 0.0, fit->step, shapes[i].blur});
+    fits.lines.push_back({line.index, scan.samples(line) + window.from, window.count, *fit, shapes[i]});
   }
-  if (edges.empty()) return edges;
+  return fits;
+}
+
+// The usual noise of a grey value, share of the step.
+double noise_share(const std::vector<FittedLine>& lines) {
+  std::vector<double> shares;
+  for (const FittedLine& line : lines) shares.push_back(line.fit.residual / line.fit.step);
+  return shares.empty() ? 0.0 : median(shares);
+}
+
+}  // namespace
+
+std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
+  constexpr int kSlopeLines = 14;
+  constexpr double kLittleNoise = 0.02, kMuchNoise = 0.028, kMostSpare = 3.0;
+  if (traced.empty()) return {};
+  const std::vector<EdgeShape> shapes =
+      regional_shapes(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
+  // The farther from the edge, the less does a level hold; where noise is the greater evil, more of it is read.
+  StepFits fits = fit_shapes(scan, traced, shapes, 0.0);
+  const double noise = noise_share(fits.lines);
+
+  if (noise > kLittleNoise)
+    fits = fit_shapes(scan, traced, shapes,
+                      kMostSpare * std::min(1.0, (noise - kLittleNoise) / (kMuchNoise - kLittleNoise)));
+  std::vector<StepEdge>& edges = fits.edges;
+  if (edges.empty()) return {};
+  const std::vector<double> shifts = shifts_by_slopes(fits.lines, kSlopeLines);
   // A handful of samples tells little about the noise: the rim's common noise is the floor.
-  residuals = own;
+  std::vector<double> residuals;
+  for (const FittedLine& line : fits.lines) residuals.push_back(line.fit.residual);
   const double common = median(residuals);
-  for (std::size_t i = 0; i < edges.size(); ++i) edges[i].sigma_px = unit[i] * std::max(common, own[i]);
-  return edges;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    edges[i].position_px += shifts[i];
+    edges[i].sigma_px = fits.lines[i].fit.sigma_unit * std::max(common, fits.lines[i].fit.residual);
+  }
+  return std::move(edges);
 }
 
 std::vector<StepEdge> zero_crossing_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced) {

@@ -120,6 +120,12 @@ std::optional<StepFit> fit(const float* values, int count, double start, EdgeSha
 
 }  // namespace
 
+EdgeProfile edge_profile(double z, const EdgeShape& shape) {
+  const ShapeAt at = shape_at(z, shape);
+  const double ramp = z * normal_distribution(z) + normal_density(z);
+  return {at.value, at.by_z, ramp, ramp - z};
+}
+
 std::optional<StepFit> fit_step(const float* values, int count, double start, double blur, bool free_blur) {
   return fit(values, count, start, {blur, 0.0}, free_blur);
 }

@@ -22,6 +22,14 @@ struct EdgeShape {
   double rise = 0.0;  ///< share of the step, per root of a sample
 };
 
+/// An edge's grey values at z = (i - position)/blur, for a step of 1: the step with its rise, its slope along z, and a
+/// change by 1 per blur of the level inside and of the level outside, blurred like the step.
+struct EdgeProfile {
+  double value, by_z;
+  double ramp_inside, ramp_outside;
+};
+EdgeProfile edge_profile(double z, const EdgeShape& shape);
+
 /// Least-squares fit of outside + step Phi((i - position)/blur) to `count` values: the most likely position under white
 /// noise. `blur` is fitted too when `free_blur`, else kept. Nothing when it does not settle near `start`.
 std::optional<StepFit> fit_step(const float* values, int count, double start, double blur, bool free_blur);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "node/imprint/rim_agreement.h"
 #include "node/imprint/rim_steps.h"
 
 namespace imprint {
@@ -38,7 +39,8 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
 // What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
-  constexpr double kDip = 0.025, kBump = 0.07;             // of the step: half the trust is gone
+  constexpr double kDip = 0.03, kBump = 0.09;              // of the step: half the trust is gone
+  constexpr double kNoiseTurnDeg = 60, kMostSigma = 0.2, kFairSigma = 0.2;
   RimCurve curve;
   if (points.empty()) return curve;
   curve.reserve(points.size());
@@ -53,9 +55,11 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const EdgePoint& p = points[i];
     const double by_body = std::clamp((p.body_share - kDarkShare) / (kBrightShare - kDarkShare), 0.0, 1.0);
-    const double by_magnitude = std::min(1.0, p.magnitude / (0.7 * magnitude + 1e-9));
-    const double by_direction = std::pow(std::min(1.0, 2.5 * calm_deg / std::max(1e-3, unrest[i])), 2);
-    const double excess = std::max(1.0, p.sigma_px / (1.5 * sigma));
+    const double by_magnitude = std::min(1.0, p.magnitude / (0.4 * magnitude + 1e-9));
+    // Where the contrast is low, noise alone turns the gradient: by about 30 deg for a pixel of the edge's own sigma.
+    const double allowed_deg = std::hypot(2.5 * calm_deg, kNoiseTurnDeg * std::min(p.sigma_px, kMostSigma));
+    const double by_direction = std::pow(std::min(1.0, allowed_deg / std::max(1e-3, unrest[i])), 2);
+    const double excess = std::max(1.0, p.sigma_px / std::max(1.5 * sigma, kFairSigma));
     // Scale that is colder than what is behind it, or glows faintly itself, lies between this edge and the true rim.
     const double by_outside =
         1.0 / (1.0 + std::pow(p.outside_dip / kDip, 2)) / (1.0 + std::pow(p.outside_bump / kBump, 2));
@@ -65,13 +69,20 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   return curve;
 }
 
+// Whether the samples lie to one side of the station: there a parabola runs away.
+bool lopsided(const RimCurve& near, double station_px, double half) {
+  double sum = 0, moment = 0;
+  for (const CurveSample& s : near) sum += s.weight, moment += s.weight * (s.station_px - station_px);
+  return std::abs(moment) > 0.2 * half * sum;
+}
+
 // Robust (bisquare) local fit at every whole station; never across the cuts. Weight: the mean trust in its samples,
 // less where they lie to one side or are few.
-RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts, int window, double noise_px) {
+RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts, int window, double noise_px,
+                          double least_trust) {
   RimCurve out;
   if (curve.empty()) return out;
   const double half = 0.5 * window;
-  constexpr double kLeastTrust = 0.2;
   const double scale = 4.685 * std::max(noise_px, 0.02);
   double kernel = 0;  // the sum of the weights of a full window
   for (int k = -static_cast<int>(half); k <= static_cast<int>(half); ++k)
@@ -90,7 +101,8 @@ RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts
       const double z = (s.station_px - station) / (half + 1);
       s.weight *= std::pow(1 - std::abs(z * z * z), 3);
     }
-    auto fit = fit_parabola(near.data(), near.data() + near.size(), station, 2);
+    const int degree = lopsided(near, station, half) ? 1 : 2;
+    auto fit = fit_parabola(near.data(), near.data() + near.size(), station, degree);
     if (near.size() > 4) {
       prior.clear();
       for (const CurveSample& s : near) prior.push_back(s.weight);
@@ -100,15 +112,25 @@ RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts
           const double r = (near[i].offset_px - current.at(near[i].station_px)) / scale;
           near[i].weight = prior[i] * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
         }
-        fit = fit_parabola(near.data(), near.data() + near.size(), station, 2);
+        fit = fit_parabola(near.data(), near.data() + near.size(), station, degree);
       }
     }
     for (const CurveSample& s : near) trust += s.weight;
     // A cut takes away one half of the window at most: that is no reason for distrust.
     const double share = fit ? std::clamp(2 * trust / kernel, 0.0, 1.0) : 0.0;
-    out.push_back({station, fit ? fit->c0 : 0.0, share < kLeastTrust ? 0.0 : share});
+    out.push_back({station, fit ? fit->c0 : 0.0, share < least_trust ? 0.0 : share});
   }
   return out;
+}
+
+// A few trusted stations alone among untrusted ones are there by chance.
+void drop_short_runs(RimCurve& curve, std::size_t least_run) {
+  for (std::size_t begin = 0; begin < curve.size();) {
+    std::size_t end = begin;
+    while (end < curve.size() && curve[end].weight > 0) ++end;
+    for (std::size_t i = begin; i < end && end - begin < least_run; ++i) curve[i].weight = 0.0;
+    begin = std::max(end, begin + 1);
+  }
 }
 
 // Finite offsets where nothing is trusted: on the line between the trusted neighbours.
@@ -132,63 +154,6 @@ void bridge_untrusted(RimCurve& curve) {
   }
 }
 
-// Where the middle of the rims leaves its smooth course, one of them is wrong: scale moves an edge inwards, so the
-// one that lies further in is not believed.
-void reject_disagreement(RimCurve& upper, RimCurve& lower, const FilterConfig& config) {
-  const RimCurve middle = middle_of(upper, lower);
-  if (middle.size() < 20) return;
-  const double noise = std::max(0.05, rim_noise_px(middle));
-  RimCurve course = middle;
-  std::vector<double> residual(middle.size(), 0.0);
-  std::vector<char> reached(middle.size(), 0);
-  for (int pass = 0; pass < 5; ++pass) {
-    // A coarse grid will do: the course is smooth by intent.
-    constexpr double kEvery = 10;
-    const double first = middle.front().station_px, last = middle.back().station_px;
-    std::vector<double> grid;
-    for (double s = first; s <= last + kEvery; s += kEvery)
-      grid.push_back(fit_at_station(course, samples_near(course, std::min(s, last), 0.5 * config.agreement_window),
-                                    std::min(s, last), 2)
-                         .value_or(std::nan("")));
-    for (std::size_t i = 0; i < middle.size(); ++i) {
-      const double at = (middle[i].station_px - first) / kEvery;
-      const auto g = std::min(static_cast<std::size_t>(at), grid.size() - 2);
-      const double t = at - static_cast<double>(g);
-      const double smooth = (1 - t) * grid[g] + t * grid[g + 1];
-      reached[i] = !std::isnan(smooth);
-      residual[i] = reached[i] ? middle[i].offset_px - smooth : 0.0;
-    }
-    const double scale = 4.685 * std::max(noise, 0.25 * config.min_disagreement_px);
-    for (std::size_t i = 0; i < middle.size(); ++i) {
-      const double r = residual[i] / scale;
-      course[i].weight = middle[i].weight * (std::abs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0.0);
-    }
-  }
-  // Out of reach of any trusted middle, its parabola over the whole length still tells a rim that is far off.
-  constexpr double kEitherPx = 1.5, kFarOffPx = 5.0;
-  const double centre = 0.5 * (middle.front().station_px + middle.back().station_px);
-  if (const auto whole = fit_parabola(course.data(), course.data() + course.size(), centre, 2)) {
-    for (std::size_t i = 0; i < middle.size(); ++i) {
-      const double off = middle[i].offset_px - whole->at(middle[i].station_px);
-      if (!reached[i] && std::abs(off) > kFarOffPx) residual[i] = off;
-    }
-  }
-  const double limit = std::max(config.min_disagreement_px, 5 * noise);
-  const auto distrust = [](RimCurve& rim, double station, double factor) {
-    const SampleRange range = samples_near(rim, station, 0.25);
-    for (std::size_t k = range.first; k < range.last; ++k) rim[k].weight *= factor;
-  };
-  for (std::size_t i = 0; i < middle.size(); ++i) {
-    const double excess = std::abs(residual[i]) / limit;
-    if (excess <= 0.5) continue;
-    const double factor = excess > 1 ? 0.0 : 2 * (1 - excess);
-    // Far off it may as well be the other rim, taken for the edge of something behind the forging.
-    const bool either = std::abs(residual[i]) > kEitherPx;
-    if (residual[i] > 0 || either) distrust(upper, middle[i].station_px, factor);
-    if (residual[i] < 0 || either) distrust(lower, middle[i].station_px, factor);
-  }
-}
-
 }  // namespace
 
 FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& config) {
@@ -200,11 +165,15 @@ FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& c
                             lower_cuts = find_cuts(lower, noise_lower, config);
   reject_disagreement(upper, lower, config);
 
+  // A rim is held against the others' in the fusion, an axis is not.
+  constexpr double kLeastRimTrust = 0.2, kLeastAxisTrust = 0.35;
   FilteredCurves out;
   const RimCurve axis = middle_of(upper, lower);
-  out.upper = local_regression(upper, upper_cuts, config.best_rim_window, noise_upper);
-  out.lower = local_regression(lower, lower_cuts, config.best_rim_window, noise_lower);
-  out.axis = local_regression(axis, {}, config.best_axis_window, rim_noise_px(axis));
+  out.upper = local_regression(upper, upper_cuts, config.best_rim_window, noise_upper, kLeastRimTrust);
+  out.lower = local_regression(lower, lower_cuts, config.best_rim_window, noise_lower, kLeastRimTrust);
+  out.axis = local_regression(axis, {}, config.best_axis_window, rim_noise_px(axis), kLeastAxisTrust);
+  const auto least_run = static_cast<std::size_t>(config.min_trusted_run);
+  drop_short_runs(out.upper, least_run), drop_short_runs(out.lower, least_run);
   bridge_untrusted(out.upper), bridge_untrusted(out.lower), bridge_untrusted(out.axis);
   return out;
 }

@@ -7,6 +7,7 @@ targets   the paper's target benchmark, recall and precision beside OpenCV's ArU
 centers   the spread of rendered targets' centres beside the bound, their bias, the stated sigma; only when asked for.
 calibration  tables 3 to 5 and figure 9 of paper B on rendered frames, and 200 repetitions; only when asked for.
 survey    60 rendered photographs of a target field, surveyed and held against the truth; only when asked for.
+silhouettes  tables 2 to 7 of paper C on rendered scenes, all seven methods; only when asked for.
 clutter   200 frames of 4 megapixels without targets: what is claimed to be one; only when asked for.
 """
 import argparse
@@ -75,10 +76,13 @@ def print_row(scene, observations, seed, values):
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     papers = {"targets": "targets", "clutter": "targets", "centers": "targets", "calibration": "calibration", "survey": "survey"}
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", *papers], help="default: stages and accuracy")
+    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "silhouettes", *papers], help="default: stages and accuracy")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)
     options = parser.parse_args()
+    if options.name == "silhouettes":
+        tables = ROOT / "tests" / "paper" / "silhouettes" / "tables.py"
+        sys.exit(subprocess.run([sys.executable, tables, "--programs", BUILD], check=False).returncode)
     if options.name in papers:
         bench = BUILD / "tests" / "paper" / papers[options.name] / f"{options.name}_bench"
         sys.exit(subprocess.run([bench], check=False).returncode)
