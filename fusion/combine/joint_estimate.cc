@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "fusion/combine/rod_surface.h"
+#include "fusion/combine/tangent_rows.h"
 #include "fusion/combine/unseen_steps.h"
 #include "lib/geometry/rotation.h"
 
@@ -22,40 +23,6 @@ constexpr double kLeastOutOfRound = 7e-3;  // of the radius: what a forging may 
 constexpr double kFreedom = 4.0;           // of Student's t for the tangents
 constexpr double kStartShare = 0.05;       // sigma of the start's radius, of the radius
 constexpr double kPlaceShare = 0.02;       // variance of a station's place along x, in squared steps between nodes
-
-/// One camera of one observation.
-struct Viewer {
-  std::size_t observation = 0;
-  Eigen::Vector3d center_world_mm;
-  Matrix6d pose_covariance = Matrix6d::Zero();
-  Eigen::Matrix3d R_cam_world;
-  int column = 0;  ///< of its unknowns in the border
-};
-
-/// One tangent, ordered along its rim.
-struct Row {
-  std::size_t viewer = 0;
-  Eigen::Vector3d ray_world;
-  double variance_mm2 = 1.0;  ///< stated, weight included
-  bool continues = false;     ///< the same rim as the row before, one station on
-  double x_mm = 0.0;
-  double residual_mm = 0.0;
-  double from_circle_mm = 0.0;  ///< from the section without its out-of-round
-  double trust = 1.0;
-  bool used = false;
-};
-
-/// A row put into the equations: normal . c + support = value.
-struct Equation {
-  std::size_t node = 0;
-  double share = 0.0;  ///< of the next node
-  double along = 0.0;  ///< share of the length
-  NodeVector coefficients = NodeVector::Zero();
-  double value_mm = 0.0;
-  double extra_variance_mm2 = 0.0;    ///< of the value, beside the tangent's own
-  double camera = 0.0;                ///< effect of the camera's place
-  Vector6d place = Vector6d::Zero();  ///< effect of the observation's place: shift, turn about the middle
-};
 
 class JointSolver {
  public:
@@ -88,7 +55,9 @@ class JointSolver {
       radius_range_.emplace_back(step ? *low : start_radius_mm[i], step ? *high : start_radius_mm[i]);
     }
     start_ = nodes_;
-    collect_rows(observations);
+    TangentRows all = tangent_rows(observations);
+    viewers_ = std::move(all.viewers);
+    rows_ = std::move(all.rows);
     std::vector<double> out_of_round;
     for (const ObservedForging& observed : observations) out_of_round.push_back(observed.out_of_round_mm);
     out_of_round_mm_ = std::max(median(out_of_round), kLeastOutOfRound * radius_mm_);
@@ -99,8 +68,8 @@ class JointSolver {
   std::optional<JointEstimate> run() {
     for (int iteration = 0; iteration < config_.iterations; ++iteration)
       if (!improve(iteration + 1 == config_.iterations)) return std::nullopt;
-    together_ = std::max(kTogether, moved_together());
-    std::vector<std::optional<Equation>> equations;
+    together_ = std::max(kTogether, moved_together(rows_, noise_scale_));
+    std::vector<std::optional<TangentEquation>> equations;
     if (!solve(Use::interval, equations)) return std::nullopt;
     JointEstimate estimate;
     estimate.step_mm = step_mm_;
@@ -126,92 +95,33 @@ class JointSolver {
     return sorted[sorted.size() / 2];
   }
 
+  /// Of a viewer's unknowns in the border.
+  static int camera_column(std::size_t viewer) { return static_cast<int>(viewer) * kCameraUnknowns; }
   int place_column(std::size_t observation) const {
     return static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(observation - 1) * kPlaceUnknowns;
   }
 
-  void collect_rows(std::span<const ObservedForging> observations) {
-    for (std::size_t k = 0; k < observations.size(); ++k) {
-      const ObservedForging& observed = observations[k];
-      for (std::size_t c = 0; c < observed.cameras.size(); ++c) {
-        const CameraShare& share = observed.cameras[c];
-        if (share.excluded) continue;
-        Viewer viewer{.observation = k,
-                      .center_world_mm = share.pose.center_world_mm,
-                      .pose_covariance = share.pose.covariance,
-                      .R_cam_world = share.pose.R_cam_world,
-                      .column = static_cast<int>(viewers_.size()) * kCameraUnknowns};
-        if (!viewer.pose_covariance.allFinite()) viewer.pose_covariance.setZero();
-        viewer.pose_covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(observed.disagreement_sigma_mm, 2);
-        for (const bool upper : {true, false}) {
-          const std::size_t first = rows_.size();
-          for (const ObservedSection& section : observed.sections)
-            for (const TangentPlane& tangent : section.tangents)
-              if (tangent.camera == static_cast<int>(c) && tangent.upper == upper && tangent.weight > 0.0)
-                rows_.push_back({.viewer = viewers_.size(),
-                                 .ray_world = tangent.ray_world,
-                                 .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight,
-                                 .x_mm = tangent.s_mm,
-                                 .trust = tangent.stray ? 0.0 : 1.0});
-          std::sort(rows_.begin() + static_cast<std::ptrdiff_t>(first), rows_.end(),
-                    [](const Row& a, const Row& b) { return a.x_mm < b.x_mm; });
-          for (std::size_t i = first + 1; i < rows_.size(); ++i) rows_[i].continues = true;
-        }
-        viewers_.push_back(viewer);
-      }
-    }
-  }
-
-  std::optional<Equation> equation_of(Row& row, const RodSurface& rod) const {
-    const Viewer& viewer = viewers_[row.viewer];
-    const Placement& placement = placements_[viewer.observation];
-    const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
-    const auto contact = rod.touch(center, placement.R * row.ray_world, row.x_mm);
-    if (!contact) return std::nullopt;
-    row.x_mm = contact->nearest_x_mm;
-    const double margin = end_margin_ * step_mm_;
-    if (row.x_mm < margin || row.x_mm > length_mm_ - margin) return std::nullopt;
-    Equation equation;
-    equation.extra_variance_mm2 = shoulder_variance_mm2(*contact);
-    equation.node = contact->node;
-    equation.share = contact->share;
-    equation.along = std::clamp(contact->x_mm / length_mm_, 0.0, 1.0);
-    equation.value_mm = contact->value_mm;
-    NodeVector& g = equation.coefficients;
-    g(kY) = contact->normal.x();
-    g(kZ) = contact->normal.y();
-    g(kRadius) = 1.0;
-    g.tail<2 * kHarmonics>() = contact->harmonics;
-    const Eigen::Vector3d& normal = contact->surface_normal;
-    const Eigen::Vector3d view = contact->point_mm - center;
-    equation.camera = normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
-    // A move of the observation moves the point on the ray, and with it the value: seen from the model, the other way.
-    const Eigen::Vector3d lever = contact->point_mm - Eigen::Vector3d(0.5 * length_mm_, 0.0, 0.0);
-    equation.place.head<3>() = -normal;
-    equation.place.tail<3>() = normal.cross(lever);
-    return equation;
-  }
-
   /// On a shoulder the value hangs on where along x the ray touches, and so on the out-of-round as far as it is not
   /// known yet.
-  double shoulder_variance_mm2(const RodSurface::Contact& contact) const {
+  double shoulder_variance_mm2(const TangentEquation& equation) const {
     const std::size_t last = nodes_.size() - 1;
-    const std::size_t a = contact.node > 0 ? contact.node - 1 : 0;
-    const std::size_t b = std::min(contact.node + 2, last);
+    const std::size_t a = equation.node > 0 ? equation.node - 1 : 0;
+    const std::size_t b = std::min(equation.node + 2, last);
     const double slope = (nodes_[b](kRadius) - nodes_[a](kRadius)) / (static_cast<double>(b - a) * step_mm_);
     double turning = 0.0;  // variance of d support / d theta
     for (int k = kFirstHarmonic; k <= kLastHarmonic; ++k) {
       const double variance =
           own_.empty()
               ? std::pow(prior_.harmonic_sigma_mm(k), 2)
-              : 0.5 * (own_[contact.node](cosine_of(k), cosine_of(k)) + own_[contact.node](sine_of(k), sine_of(k)));
+              : 0.5 * (own_[equation.node](cosine_of(k), cosine_of(k)) + own_[equation.node](sine_of(k), sine_of(k)));
       turning += k * k * variance;
     }
-    return slope * slope * (contact.x_per_mm * contact.x_per_mm * turning + kPlaceShare * step_mm_ * step_mm_);
+    return slope * slope * (equation.x_per_mm * equation.x_per_mm * turning + kPlaceShare * step_mm_ * step_mm_);
   }
 
   void add_camera_priors() {
-    for (const Viewer& viewer : viewers_) {
+    for (std::size_t v = 0; v < viewers_.size(); ++v) {
+      const Viewer& viewer = viewers_[v];
       const Placement& placement = placements_[viewer.observation];
       const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
       Eigen::Matrix<double, 2, 6> effect;
@@ -226,7 +136,7 @@ class JointSolver {
       }
       Eigen::Matrix2d covariance = effect * viewer.pose_covariance * effect.transpose();
       covariance.diagonal().array() += std::pow(1e-5 * radius_mm_, 2);
-      system_.corner.block<2, 2>(viewer.column, viewer.column) += covariance.inverse();
+      system_.corner.block<2, 2>(camera_column(v), camera_column(v)) += covariance.inverse();
     }
   }
 
@@ -256,7 +166,7 @@ class JointSolver {
   }
 
   /// The equations of this round, solved; false when they cannot be.
-  bool solve(Use use, std::vector<std::optional<Equation>>& equations) {
+  bool solve(Use use, std::vector<std::optional<TangentEquation>>& equations) {
     const int border =
         static_cast<int>(viewers_.size()) * kCameraUnknowns + static_cast<int>(placements_.size() - 1) * kPlaceUnknowns;
     system_ = BorderedSystem(static_cast<int>(nodes_.size()), border);
@@ -267,8 +177,13 @@ class JointSolver {
     const RodSurface rod(nodes_, step_mm_);
     equations.clear();
     equations.reserve(rows_.size());
-    for (Row& row : rows_) equations.push_back(equation_of(row, rod));
-    if (!(noise_scale_ > 0.0)) noise_scale_ = std::max(kLeastNoise, rim_scatter(equations));
+    for (TangentRow& row : rows_) {
+      const Viewer& viewer = viewers_[row.viewer];
+      equations.push_back(
+          equation_of(row, viewer, placements_[viewer.observation], rod, length_mm_, end_margin_ * step_mm_));
+      if (equations.back()) equations.back()->extra_variance_mm2 = shoulder_variance_mm2(*equations.back());
+    }
+    if (!(noise_scale_ > 0.0)) noise_scale_ = std::max(kLeastNoise, rim_scatter(rows_, equations, start_));
     for (std::size_t r = 0; r < rows_.size(); ++r)
       if (equations[r]) add_equation(rows_[r], *equations[r]);
     if (!system_.solve()) return false;
@@ -277,7 +192,7 @@ class JointSolver {
   }
 
   bool improve(bool last) {
-    std::vector<std::optional<Equation>> equations;
+    std::vector<std::optional<TangentEquation>> equations;
     if (!solve(Use::estimate, equations)) return false;
     nodes_ = system_.node_solution;
     camera_solution_ = system_.border_solution.head(camera_solution_.size());
@@ -290,7 +205,7 @@ class JointSolver {
     return true;
   }
 
-  void add_equation(const Row& row, const Equation& equation) {
+  void add_equation(const TangentRow& row, const TangentEquation& equation) {
     const std::size_t i = equation.node;
     const double w =
         row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * together_ + equation.extra_variance_mm2);
@@ -305,7 +220,7 @@ class JointSolver {
     system_.right[i + 1] += w * next * equation.value_mm * g;
 
     const Viewer& viewer = viewers_[row.viewer];
-    std::array<int, kCameraUnknowns + kPlaceUnknowns> columns{viewer.column, viewer.column + 1};
+    std::array<int, kCameraUnknowns + kPlaceUnknowns> columns{camera_column(row.viewer), camera_column(row.viewer) + 1};
     std::array<double, kCameraUnknowns + kPlaceUnknowns> effects{equation.camera * (1.0 - equation.along),
                                                                  equation.camera * equation.along};
     std::size_t count = kCameraUnknowns;
@@ -325,18 +240,19 @@ class JointSolver {
     }
   }
 
-  void find_residuals(std::span<const std::optional<Equation>> equations) {
+  void find_residuals(std::span<const std::optional<TangentEquation>> equations) {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
-      Row& row = rows_[r];
+      TangentRow& row = rows_[r];
       row.used = equations[r].has_value();
       if (!row.used) continue;
-      const Equation& equation = *equations[r];
+      const TangentEquation& equation = *equations[r];
       const Viewer& viewer = viewers_[row.viewer];
       const NodeVector node =
           (1.0 - equation.share) * nodes_[equation.node] + equation.share * nodes_[equation.node + 1];
-      double model = equation.coefficients.dot(node) +
-                     equation.camera * ((1.0 - equation.along) * camera_solution_(viewer.column) +
-                                        equation.along * camera_solution_(viewer.column + 1));
+      const int camera = camera_column(row.viewer);
+      double model =
+          equation.coefficients.dot(node) + equation.camera * ((1.0 - equation.along) * camera_solution_(camera) +
+                                                               equation.along * camera_solution_(camera + 1));
       if (viewer.observation > 0)
         model += equation.place.dot(system_.border_solution.segment<kPlaceUnknowns>(place_column(viewer.observation)));
       row.residual_mm = equation.value_mm - model;
@@ -359,7 +275,7 @@ class JointSolver {
   /// What lies far out of what the rod is out of round belongs to something else (Tukey's biweight). Next to a step
   /// any radius from the one to the other is on the rod. Of several observations none is silenced for contradicting
   /// the others: one that was turned wrongly has to show.
-  double belongs(const Row& row, const Equation& equation) const {
+  double belongs(const TangentRow& row, const TangentEquation& equation) const {
     if (placements_.size() > 1) return 1.0;
     const double radius = (1.0 - equation.share) * nodes_[equation.node](kRadius) +
                           equation.share * nodes_[equation.node + 1](kRadius) + row.from_circle_mm;
@@ -371,63 +287,12 @@ class JointSolver {
     return std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
   }
 
-  /// Scatter of the tangents along their rims, from second differences wide enough to see what haze and filtering move
-  /// together; read off the start, not off the estimate, which could bend itself to the tangents until none scatter.
-  double rim_scatter(std::span<const std::optional<Equation>> equations) const {
-    constexpr std::size_t kApart = 8;  // stations: some 25 px
-    std::vector<double> bends;
-    for (std::size_t r = 0; r + 2 * kApart < rows_.size(); ++r) {
-      bool same_rim = true;
-      for (std::size_t k = r + 1; k <= r + 2 * kApart && same_rim; ++k) same_rim = rows_[k].continues;
-      const Row &a = rows_[r], &b = rows_[r + kApart], &c = rows_[r + 2 * kApart];
-      if (!same_rim || !(a.trust > 0.0 && b.trust > 0.0 && c.trust > 0.0)) continue;
-      if (!equations[r] || !equations[r + kApart] || !equations[r + 2 * kApart]) continue;
-      const auto off = [&](std::size_t k) {
-        const Equation& e = *equations[k];
-        return e.value_mm - e.coefficients.dot((1.0 - e.share) * start_[e.node] + e.share * start_[e.node + 1]);
-      };
-      bends.push_back(std::abs(off(r) - 2.0 * off(r + kApart) + off(r + 2 * kApart)) / std::sqrt(b.variance_mm2));
-    }
-    return bends.empty() ? 1.0 : 1.4826 * median(bends) / std::sqrt(6.0);
-  }
-
-  /// How many neighbouring tangents of a rim count as one: the sum of their residuals' likeness over all distances, out
-  /// to where none is left. Counted so, a rim that hot air bends over tens of px says no more than it knows.
-  double moved_together() const {
-    constexpr std::size_t kFurthest = 120;  // stations
-    constexpr double kNone = 0.05, kMost = 2.5;
-    double squares = 0.0, count = 0.0;
-    // What belongs to something else is no measure of what moves the rims.
-    const auto size_of = [&](const Row& row) {
-      return std::clamp(row.residual_mm * std::sqrt(row.trust / row.variance_mm2) / noise_scale_, -kMost, kMost);
-    };
-    for (const Row& row : rows_) {
-      if (!row.used) continue;
-      squares += size_of(row) * size_of(row), count += 1.0;
-    }
-    if (!(squares > 0.0)) return 1.0;
-    double sum = 1.0;
-    for (std::size_t lag = 1; lag < kFurthest; lag += 1 + lag / 8) {
-      double products = 0.0, pairs = 0.0;
-      std::size_t run = 0;  // rows of the same rim up to this one
-      for (std::size_t r = 0; r < rows_.size(); ++r) {
-        run = rows_[r].continues ? run + 1 : 0;
-        if (run < lag || !rows_[r].used || !rows_[r - lag].used) continue;
-        products += size_of(rows_[r]) * size_of(rows_[r - lag]), pairs += 1.0;
-      }
-      const double likeness = pairs > 0.0 ? products / pairs / (squares / count) : 0.0;
-      if (likeness < kNone) break;
-      sum += 2.0 * likeness * static_cast<double>(1 + lag / 8);
-    }
-    return sum;
-  }
-
   /// Whom to trust in the next round.
-  void weigh(std::span<const std::optional<Equation>> equations) {
+  void weigh(std::span<const std::optional<TangentEquation>> equations) {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
-      Row& row = rows_[r];
+      TangentRow& row = rows_[r];
       if (!row.used) continue;
-      const Equation& e = *equations[r];
+      const TangentEquation& e = *equations[r];
       const NodeVector& g = e.coefficients;
       const double here = 1.0 - e.share;
       const double fitted = here * here * g.dot(own_[e.node] * g) + e.share * e.share * g.dot(own_[e.node + 1] * g) +
@@ -448,7 +313,7 @@ class JointSolver {
   SectionPrior prior_;
   BorderedSystem system_;
   std::vector<Viewer> viewers_;
-  std::vector<Row> rows_;
+  std::vector<TangentRow> rows_;
   std::vector<NodeVector> nodes_, start_;
   std::vector<NodeMatrix> own_, with_next_;
   std::vector<std::pair<double, double>> radius_range_;  ///< about each node, of the start
