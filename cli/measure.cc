@@ -20,6 +20,7 @@ struct MeasureOptions {
   std::filesystem::path session;
   std::filesystem::path out;
   std::string method = "best";
+  std::string geometry = "joint";
 };
 
 // The imprint with its curves rounded as the wire rounds them, so that a running line gives the same numbers; where
@@ -85,7 +86,8 @@ Result<Measurement> measure(const MeasureOptions& options) {
     if (!observation) return pass_on(observation.error());
     observations.push_back(std::move(*observation));
   }
-  auto measurement = fuse(observations, rig->forging, options.session.stem().string(), options.method);
+  auto measurement = fuse(observations, rig->forging, options.session.stem().string(), options.method,
+                          geometry_method_of(options.geometry));
   if (!measurement) return measurement;
   measurement->warnings.insert(measurement->warnings.begin(), rig->warnings.begin(), rig->warnings.end());
   measurement->warnings.insert(measurement->warnings.begin(), warnings.begin(), warnings.end());
@@ -115,6 +117,11 @@ void add_measure_command(Cli& cli) {
                               [options, &cli] { return run_measure(*options, cli.json); });
   command->add_option("session", options->session, "session.toml")->required();
   command->add_option("--method", options->method, "best, orientation, magnitude, combined, uniform, none or pixel")
+      ->capture_default_str();
+  command
+      ->add_option("--geometry", options->geometry,
+                   "joint: from all tangents at once; thesis: axis as the middle of the rims")
+      ->check(CLI::IsMember(std::vector<std::string>(kGeometryMethods.begin(), kGeometryMethods.end())))
       ->capture_default_str();
   command->add_option("--out", options->out, "write result.json here");
 }

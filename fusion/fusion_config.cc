@@ -19,7 +19,8 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   FusionConfig config;
   TomlReader read(path, table);
   read.only({"fusion.site", "fusion.line", "fusion.rig", "fusion.database", "fusion.result_dir", "fusion.deadline_s",
-             "fusion.method", "fusion.log_level", "zenoh.connect", "zenoh.listen", "page.address", "page.port"});
+             "fusion.method", "fusion.geometry", "fusion.log_level", "zenoh.connect", "zenoh.listen", "page.address",
+             "page.port"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
@@ -27,6 +28,8 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   config.result_dir = read.path("fusion.result_dir", config.result_dir);
   config.assembler.deadline_s = read.number("fusion.deadline_s", config.assembler.deadline_s);
   config.method = read_choice(read, "fusion.method", kMethods, config.method);
+  config.geometry =
+      geometry_method_of(read_choice(read, "fusion.geometry", kGeometryMethods, std::string(name_of(config.geometry))));
   config.log_level = read_choice(read, "fusion.log_level", kLogLevels, config.log_level);
   config.zenoh = read_zenoh_section(read, config.zenoh);
   config.page.address = read.string("page.address", config.page.address);
@@ -46,14 +49,15 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
 
 std::string to_toml(const FusionConfig& config) {
   return fmt::format(
-      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmethod = {}\nlog_level = {}\n\n"
+      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmethod = {}\ngeometry = "
+      "{}\nlog_level = {}\n\n"
       "[zenoh]\nlisten = {}\nconnect = {}\n\n[page]\naddress = {}\nport = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
-      toml_number(config.assembler.deadline_s), toml_text(config.method), toml_text(config.log_level),
-      toml_list(config.zenoh.listen), toml_list(config.zenoh.connect), toml_text(config.page.address),
-      config.page.port);
+      toml_number(config.assembler.deadline_s), toml_text(config.method), toml_text(name_of(config.geometry)),
+      toml_text(config.log_level), toml_list(config.zenoh.listen), toml_list(config.zenoh.connect),
+      toml_text(config.page.address), config.page.port);
 }
 
 }  // namespace imprint

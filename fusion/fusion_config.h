@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "fusion/geometry_method.h"
 #include "fusion/receive/observation_assembler.h"
 #include "fusion/serve/page_server.h"
 #include "lib/config/toml_file.h"
@@ -19,6 +20,7 @@ struct FusionConfig {
   std::filesystem::path database = "imprint.db";
   std::filesystem::path result_dir;  // empty: none
   std::string method = "best";
+  GeometryMethod geometry = GeometryMethod::joint;
   std::string log_level = "info";
   AssemblerConfig assembler;
   ZenohConfig zenoh{.connect = {}, .listen = {"tcp/127.0.0.1:7447"}, .router = true};

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "fusion/combine/combine_config.h"
+#include "fusion/thesis/thesis_geometry.h"
 #include "fusion/triangulate/triangulate_config.h"
 
 namespace imprint {
@@ -57,12 +58,25 @@ void note_poses(const std::vector<Observation>& observations, std::vector<Measur
   }
 }
 
+// The views of the cameras that agree, for the thesis's estimators.
+Result<SpaceCurves> curves_of(const Observation& observation, const ObservedForging& triangulated,
+                              const ForgingSpec& forging) {
+  std::vector<CameraView> views;
+  for (std::size_t i = 0; i < observation.imprints.size(); ++i) {
+    if (triangulated.cameras[i].excluded) continue;
+    auto view = view_of(observation.imprints[i], static_cast<int>(i), TriangulateConfig{}.min_rim_share);
+    if (view) views.push_back(std::move(*view));
+  }
+  return space_curves(views, forging, ThesisConfig{});
+}
+
 }  // namespace
 
 Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
-                         std::string method) {
+                         std::string method, GeometryMethod geometry) {
   if (observations.empty()) return job_failed("session {}: no observation", session);
   std::vector<ObservedForging> observed;
+  std::vector<SpaceCurves> curves;  // of `observed`, where the thesis's geometry is asked for
   std::vector<double> rotations_deg;
   std::vector<Measurement::Observation> reports;
   std::vector<std::string> warnings;
@@ -91,6 +105,12 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
     }
     reports.push_back(std::move(report));
     if (!triangulated) continue;
+    if (geometry == GeometryMethod::thesis) {
+      auto of_views = curves_of(observation, *triangulated, forging);
+      if (!of_views)
+        return job_failed("session {}: observation {}: {}", session, observation.index, of_views.error().message);
+      curves.push_back(std::move(*of_views));
+    }
     observed.push_back(std::move(*triangulated));
     rotations_deg.push_back(observation.rotation_deg);
   }
@@ -100,10 +120,13 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
     return job_failed("session {}: {}{}", session, first_failure, missing);
   }
   note_poses(observations, reports, warnings);
-  auto combined = combine(observed, rotations_deg, forging, CombineConfig{});
+  auto combined = geometry == GeometryMethod::thesis ? thesis_geometry(curves, rotations_deg, forging, ThesisConfig{})
+                                                     : combine(observed, rotations_deg, forging, CombineConfig{});
   if (!combined) return job_failed("session {}: {}", session, combined.error().message);
   combined->warnings.insert(combined->warnings.begin(), warnings.begin(), warnings.end());
-  return make_measurement(*combined, std::move(reports), std::move(session), std::move(method));
+  Measurement measurement = make_measurement(*combined, std::move(reports), std::move(session), std::move(method));
+  measurement.geometry = name_of(geometry);
+  return measurement;
 }
 
 }  // namespace imprint

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "fusion/geometry_method.h"
 #include "fusion/receive/observation.h"
 #include "fusion/results/measurement.h"
 #include "lib/result/result.h"
@@ -11,9 +12,9 @@
 namespace imprint {
 
 /// The whole fusion: triangulate every observation, combine, evaluate. A pure call.
-/// A camera with a failure or missing is excluded and named in the warnings; fails (job_failed)
-/// only when no observation has two usable cameras.
+/// Which cameras agree is found alike for either geometry. A camera with a failure or missing is excluded and named in
+/// the warnings; fails (job_failed) only when no observation has two usable cameras.
 Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
-                         std::string method);
+                         std::string method, GeometryMethod geometry = GeometryMethod::joint);
 
 }  // namespace imprint

@@ -67,7 +67,11 @@ Result<void> run(const ProgramOptions& options) {
   if (!page) return pass_on(page.error());
   auto transport = open_zenoh(config->zenoh);
   if (!transport) return pass_on(transport.error());
-  FusionService service(*config, *rig, **transport, **store, board, fuse);
+  FusionService service(*config, *rig, **transport, **store, board,
+                        [geometry = config->geometry](const auto& observations, const ForgingSpec& forging,
+                                                      std::string session, std::string method) {
+                          return fuse(observations, forging, std::move(session), std::move(method), geometry);
+                        });
   if (auto started = service.start(); !started) return started;
   spdlog::info("fusion of {}/{} ready, {} cameras, page http://{}:{}/", config->site, config->line, camera_ids.size(),
                config->page.address, (*page)->port());

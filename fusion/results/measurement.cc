@@ -133,6 +133,7 @@ nlohmann::json to_json(const Measurement& measurement) {
   json["schema"] = kSchema;
   json["session"] = measurement.session;
   json["method"] = measurement.method;
+  json["geometry"] = measurement.geometry;
   if (!measurement.line.empty()) json["line"] = measurement.line;
   if (!measurement.made_at.empty()) json["made_at"] = measurement.made_at;
   json["length_mm"] = measurement.length_mm;
@@ -162,6 +163,7 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     Measurement measurement;
     measurement.session = json.value("session", "");
     measurement.method = json.at("method").get<std::string>();
+    measurement.geometry = json.value("geometry", "joint");
     measurement.line = json.value("line", "");
     measurement.made_at = json.value("made_at", "");
     measurement.length_mm = json.at("length_mm").get<double>();

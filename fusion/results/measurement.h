@@ -22,6 +22,7 @@ struct Measurement {
   };
   std::string session;
   std::string method;
+  std::string geometry = "joint";  ///< fusion/geometry_method.h
   std::string line;     ///< "<site>/<line>"; empty: not measured on a running line
   std::string made_at;  ///< UTC, "2026-11-22T18:05:02.123Z"; empty: not known
   double length_mm = 0.0;

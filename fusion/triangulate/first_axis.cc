@@ -22,8 +22,13 @@ double ray_distance(const Ray& a, const Ray& b) {
   return std::abs((b.origin - a.origin).dot(across)) / sine;
 }
 
+struct AxisRay {
+  Eigen::Vector3d direction;
+  double station;
+};
+
 /// The ray of `view` closest to `ray`: where the signed volume of [D] equation 2 changes its sign.
-std::optional<Eigen::Vector3d> closest_axis_ray(const CameraView& view, const Ray& ray) {
+std::optional<AxisRay> closest_axis_ray(const CameraView& view, const Ray& ray) {
   const Eigen::Vector3d plane = (view.pose.center_world_mm - ray.origin).cross(ray.direction);
   const double scale = plane.norm();
   if (scale < 1e-9) return std::nullopt;
@@ -38,7 +43,7 @@ std::optional<Eigen::Vector3d> closest_axis_ray(const CameraView& view, const Ra
     if (before >= 0 && volume * volume_before <= 0.0 && volume != volume_before) {
       const double u = volume_before / (volume_before - volume);
       const Eigen::Vector3d& a = view.axis[static_cast<std::size_t>(before)].direction_world;
-      return ((1.0 - u) * a + u * candidate.direction_world).normalized();
+      return AxisRay{((1.0 - u) * a + u * candidate.direction_world).normalized(), before + u * (i - before)};
     }
     if (best < 0 || std::abs(volume) < std::abs(best_volume)) {
       best = i;
@@ -49,7 +54,7 @@ std::optional<Eigen::Vector3d> closest_axis_ray(const CameraView& view, const Ra
   }
   // No crossing: the ray looks past this camera's curve; only a near miss of its end counts.
   if (best < 0 || std::abs(best_volume) > 1e-3) return std::nullopt;
-  return view.axis[static_cast<std::size_t>(best)].direction_world;
+  return AxisRay{view.axis[static_cast<std::size_t>(best)].direction_world, static_cast<double>(best)};
 }
 
 /// The point nearest to all rays, [D] equation 3 by least squares; nothing where it lies behind a camera.
@@ -70,30 +75,45 @@ std::optional<Eigen::Vector3d> nearest_point(std::span<const Ray> rays) {
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> triangulate_axis_points(std::span<const CameraView> views, double max_distance_mm) {
-  std::vector<Eigen::Vector3d> points;
-  if (views.size() < 2) return points;
+std::vector<AxisGroup> group_axis_rays(std::span<const CameraView> views, double max_distance_mm) {
+  std::vector<AxisGroup> groups;
+  if (views.size() < 2) return groups;
   const auto seen = [](const CameraView& view) {
     return std::count_if(view.axis.begin(), view.axis.end(), [](const CurveRay& ray) { return ray.weight > 0.0; });
   };
-  const auto primary =
-      std::max_element(views.begin(), views.end(), [&](const auto& a, const auto& b) { return seen(a) < seen(b); });
-  std::vector<Ray> group;
-  for (const CurveRay& axis_ray : primary->axis) {
+  const auto primary = static_cast<std::size_t>(
+      std::max_element(views.begin(), views.end(), [&](const auto& a, const auto& b) { return seen(a) < seen(b); }) -
+      views.begin());
+  std::vector<Ray> rays;
+  for (std::size_t station = 0; station < views[primary].axis.size(); ++station) {
+    const CurveRay& axis_ray = views[primary].axis[station];
     if (axis_ray.weight <= 0.0) continue;
-    group.assign(1, Ray{primary->pose.center_world_mm, axis_ray.direction_world});
-    for (const CameraView& view : views) {
-      if (&view == &*primary) continue;
-      if (const auto closest = closest_axis_ray(view, group.front()))
-        group.push_back(Ray{view.pose.center_world_mm, *closest});
+    AxisGroup group;
+    group.members.push_back({primary, static_cast<double>(station)});
+    rays.assign(1, Ray{views[primary].pose.center_world_mm, axis_ray.direction_world});
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      if (v == primary) continue;
+      const auto closest = closest_axis_ray(views[v], rays.front());
+      if (!closest) continue;
+      group.members.push_back({v, closest->station});
+      rays.push_back(Ray{views[v].pose.center_world_mm, closest->direction});
     }
-    if (group.size() < 2) continue;
+    if (rays.size() < 2) continue;
     double widest = 0.0;
-    for (std::size_t i = 0; i < group.size(); ++i)
-      for (std::size_t j = i + 1; j < group.size(); ++j) widest = std::max(widest, ray_distance(group[i], group[j]));
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      for (std::size_t j = i + 1; j < rays.size(); ++j) widest = std::max(widest, ray_distance(rays[i], rays[j]));
     if (widest > max_distance_mm) continue;
-    if (const auto point = nearest_point(group)) points.push_back(*point);
+    const auto point = nearest_point(rays);
+    if (!point) continue;
+    group.point_mm = *point;
+    groups.push_back(std::move(group));
   }
+  return groups;
+}
+
+std::vector<Eigen::Vector3d> triangulate_axis_points(std::span<const CameraView> views, double max_distance_mm) {
+  std::vector<Eigen::Vector3d> points;
+  for (const AxisGroup& group : group_axis_rays(views, max_distance_mm)) points.push_back(group.point_mm);
   return points;
 }
 

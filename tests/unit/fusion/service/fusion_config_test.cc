@@ -45,6 +45,7 @@ TEST_CASE("fusion config: what is printed reads back as the same config") {
   REQUIRE(to_toml(*again) == to_toml(*config));
   REQUIRE(again->assembler.deadline_s == 2.5);
   REQUIRE(again->result_dir == folder / "out");
+  REQUIRE(again->geometry == GeometryMethod::joint);
 }
 
 TEST_CASE("fusion config: a fault names the file, the line and the key") {
@@ -56,6 +57,9 @@ TEST_CASE("fusion config: a fault names the file, the line and the key") {
   REQUIRE(fault("[fusion]\nrig = \"r\"\nsite = \"a/b\"\n").find("fusion.toml:3: fusion.site") != std::string::npos);
   REQUIRE(fault("[fusion]\nrig = \"r\"\ndead_line_s = 3\n").find("fusion.toml:3: fusion.dead_line_s: unknown key") !=
           std::string::npos);
+  REQUIRE(
+      fault("[fusion]\nrig = \"r\"\ngeometry = \"middle\"\n").find("fusion.geometry: expected one of joint, thesis") !=
+      std::string::npos);
   REQUIRE(fault("rig = \"r\"\n").find("unknown key") != std::string::npos);
   REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = [7447]\n").find("zenoh.listen: expected a list of texts") !=
           std::string::npos);

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fusion/results/measurement.h"
+#include "tests/unit/fusion/triangulate/forging_views.h"
+
+namespace imprint::test {
+
+/// One session: what was seen, how the forging was turned, and how it truly lay at first.
+struct Session {
+  ForgingSpec spec = forge_spec();
+  std::vector<std::vector<Imprint>> imprints;  ///< by observation
+  std::vector<double> rotations_deg;
+  Lying first;
+};
+
+/// How a measurement differs from the truth. Axis: distance in y and z, in RMS over the sections.
+struct Deviation {
+  double axis_rms = 0.0, axis_max = 0.0;
+  double diameter_rms = 0.0, diameter_best90_rms = 0.0;
+  double circularity_mean = 0.0, circularity_sigma = 0.0;
+  double length = 0.0;
+  double axis_covered = 0.0, diameter_covered = 0.0, circularity_covered = 0.0;
+  double length_in_ci = 0.0;
+  double axis_ci95 = 0.0;
+};
+
+/// Bent into an arc and a little S, round, 260 mm thick and 1900 mm long, times `scale`.
+Rod bent_rod(double scale = 1.0, double bow_mm = 8.0);
+
+/// The same with shoulders of 3 mm of diameter per mm, up and down.
+Rod stepped_rod();
+
+bool near_shoulder(double x_mm);  ///< of the stepped rod
+
+struct Views {
+  int observations = 1;
+  double step_deg = 30.0;
+  double noise_px = 0.0;
+  double scale = 1.0;
+  double pose_sigma_mm = 0.0;  ///< and, at the forging, as much again by its rotation
+  unsigned seed = 1;
+  std::size_t cameras = 3;
+};
+
+/// The forge's cameras look at the rod, placed as a manipulator does: to 1 mm, 0.3 deg of tilt and of turn.
+Session observe(const Rod& rod, const Views& views);
+
+/// `measured` has sections; those next to the stepped rod's shoulders may be skipped.
+Deviation deviation(const Measurement& measured, const Rod& rod, const Session& session, bool skip_shoulders = false);
+
+std::string text(const Deviation& deviation);
+
+}  // namespace imprint::test
