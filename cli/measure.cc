@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 
 #include <fmt/core.h>
@@ -21,6 +22,7 @@ struct MeasureOptions {
   std::filesystem::path out;
   std::string method = "best";
   std::string geometry = "joint";
+  std::vector<std::string> stations;  // NAME=MM
 };
 
 // The imprint with its curves rounded as the wire rounds them, so that a running line gives the same numbers; where
@@ -72,7 +74,24 @@ Result<Observation> observe(const SessionObservation& files, int index, const st
   return observation;
 }
 
+Result<std::vector<Measurement::Station>> read_stations(const std::vector<std::string>& texts) {
+  std::vector<Measurement::Station> stations;
+  for (const std::string& text : texts) {
+    const auto equals = text.rfind('=');
+    double s_mm = 0.0;
+    const char* last = text.data() + text.size();
+    const char* number = equals == std::string::npos ? last : text.data() + equals + 1;
+    const auto parsed = std::from_chars(number, last, s_mm);
+    if (equals == std::string::npos || equals == 0 || parsed.ec != std::errc() || parsed.ptr != last || !(s_mm >= 0.0))
+      return invalid_input("--station: NAME=MM with MM from the first end expected, found \"{}\"", text);
+    stations.push_back({text.substr(0, equals), s_mm});
+  }
+  return stations;
+}
+
 Result<Measurement> measure(const MeasureOptions& options) {
+  auto stations = read_stations(options.stations);
+  if (!stations) return pass_on(stations.error());
   const auto method = edge_method_from_name(options.method);
   if (!method) return pass_on(method.error());
   std::vector<std::string> warnings;
@@ -91,6 +110,11 @@ Result<Measurement> measure(const MeasureOptions& options) {
   if (!measurement) return measurement;
   measurement->warnings.insert(measurement->warnings.begin(), rig->warnings.begin(), rig->warnings.end());
   measurement->warnings.insert(measurement->warnings.begin(), warnings.begin(), warnings.end());
+  measurement->stations = std::move(*stations);
+  for (const Measurement::Station& station : measurement->stations)
+    if (station.s_mm > measurement->length_mm)
+      measurement->warnings.push_back(fmt::format("station {} at {:.1f} mm lies beyond the forging's {:.1f} mm",
+                                                  station.name, station.s_mm, measurement->length_mm));
   measurement->made_at = utc_text(wall_clock_ns());
   return measurement;
 }
@@ -123,6 +147,8 @@ void add_measure_command(Cli& cli) {
                    "joint: from all tangents at once; thesis: axis as the middle of the rims")
       ->check(CLI::IsMember(std::vector<std::string>(kGeometryMethods.begin(), kGeometryMethods.end())))
       ->capture_default_str();
+  command->add_option("--station", options->stations,
+                      "NAME=MM: name a place whose diameter is reported; may be repeated");
   command->add_option("--out", options->out, "write result.json here");
 }
 

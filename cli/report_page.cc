@@ -69,6 +69,7 @@ std::string results(const Measurement& m, const TruthComparison* truth, const Re
       "<p class=\"note\">The interval of a largest or smallest value is that of its section; a median stands with the "
       "median interval. The direction is seen from the first end, z up.</p>\n";
   if (truth != nullptr) text += "<p>" + markup_text(truth_text(m, *truth)) + ".</p>\n";
+  if (m.gain.observations > 0) text += "<p id=\"gain\">" + markup_text(gain_text(m.gain)) + ".</p>\n";
   return text;
 }
 

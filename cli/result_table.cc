@@ -27,6 +27,14 @@ std::string truth_text(const Measurement& m, const TruthComparison& truth) {
       truth.circularity_rms_mm);
 }
 
+std::string gain_text(const Measurement::Gain& gain) {
+  return fmt::format(
+      "{} observations together, the first alone: axis +-{:.2f} for +-{:.2f} mm, diameter +-{:.2f} for +-{:.2f} mm, "
+      "circularity +-{:.2f} for +-{:.2f} mm (95 %, median section)",
+      gain.observations, gain.all.axis_ci95_mm, gain.first_alone.axis_ci95_mm, gain.all.diameter_ci95_mm,
+      gain.first_alone.diameter_ci95_mm, gain.all.circularity_ci95_mm, gain.first_alone.circularity_ci95_mm);
+}
+
 std::string result_table(const Measurement& m, const TruthComparison* truth) {
   std::string text = fmt::format("Forging \"{}\", {} observation{}, method {}\n", m.session, m.observations.size(),
                                  m.observations.size() == 1 ? "" : "s", m.method);
@@ -34,6 +42,7 @@ std::string result_table(const Measurement& m, const TruthComparison* truth) {
   text += truth != nullptr ? fmt::format(" {:>10} {:>9}\n", "truth", "error") : "\n";
   for (const ResultRow& row : summarize(m, truth)) text += table_row(row);
   if (truth != nullptr) text += "  " + truth_text(m, *truth) + "\n";
+  if (m.gain.observations > 0) text += "  " + gain_text(m.gain) + "\n";
   for (const auto& observation : m.observations) {
     text += fmt::format("  observation {} at {:.1f} deg:", observation.index, observation.rotation_deg);
     for (const auto& camera : observation.cameras) {

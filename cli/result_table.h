@@ -16,4 +16,7 @@ std::string warning_lines(const Measurement& measurement);
 /// One sentence: how far the sections are from the truth.
 std::string truth_text(const Measurement& measurement, const TruthComparison& truth);
 
+/// One sentence: how much surer all observations are than the first alone.
+std::string gain_text(const Measurement::Gain& gain);
+
 }  // namespace imprint

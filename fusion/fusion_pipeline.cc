@@ -126,6 +126,11 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
   combined->warnings.insert(combined->warnings.begin(), warnings.begin(), warnings.end());
   Measurement measurement = make_measurement(*combined, std::move(reports), std::move(session), std::move(method));
   measurement.geometry = name_of(geometry);
+  if (observed.size() > 1 && geometry == GeometryMethod::joint) {
+    const auto alone =
+        combine(std::span(observed).first(1), std::span(rotations_deg).first(1), forging, CombineConfig{});
+    if (alone) measurement.gain = {static_cast<int>(observed.size()), sureness(*alone), sureness(*combined)};
+  }
   return measurement;
 }
 

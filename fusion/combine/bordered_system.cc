@@ -98,6 +98,13 @@ Eigen::MatrixXd BorderedSystem::covariance_with(const Eigen::MatrixXd& functiona
   return columns;
 }
 
+Eigen::MatrixXd BorderedSystem::deviations(const Eigen::MatrixXd& normal_values) const {
+  Eigen::MatrixXd columns = normal_values.topRows(nodes() * kNodeUnknowns);
+  backward(columns);
+  if (border.cols() > 0) columns -= border_effect_ * schur_.matrixU().solve(normal_values.bottomRows(border.cols()));
+  return columns;
+}
+
 Eigen::MatrixXd BorderedSystem::border_covariance() const {
   return border.cols() == 0 ? Eigen::MatrixXd(0, 0)
                             : Eigen::MatrixXd(schur_.solve(Eigen::MatrixXd::Identity(border.cols(), border.cols())));

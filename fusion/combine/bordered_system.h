@@ -37,6 +37,9 @@ class BorderedSystem {
   void add_border_covariance(std::vector<NodeMatrix>& own) const;
   /// Inverse times `functionals` (node unknowns by columns): covariance of every unknown with those sums.
   [[nodiscard]] Eigen::MatrixXd covariance_with(const Eigen::MatrixXd& functionals) const;
+  /// How far the nodes may lie from the solution: draws from the whole covariance, one a column of standard normal
+  /// values (node unknowns, then border, by draws). Out come (node unknowns by draws).
+  [[nodiscard]] Eigen::MatrixXd deviations(const Eigen::MatrixXd& normal_values) const;
   /// Covariance of the border's unknowns.
   [[nodiscard]] Eigen::MatrixXd border_covariance() const;
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "fusion/combine/aligned_estimate.h"
 #include "fusion/combine/alignment.h"
-#include "fusion/combine/circularity.h"
 #include "fusion/combine/combine_config.h"
 #include "fusion/combine/joint_estimate.h"
 #include "fusion/triangulate/end_planes.h"
@@ -174,74 +174,6 @@ void warn_of_unseen(CombinedForging& combined) {
   }
 }
 
-/// The estimate in the aligned frame: sections at equal steps over the length, with their uncertainty.
-void align(const JointEstimate& joint, const EndPlanes& ends, double end_section_mm, int sections,
-           CombinedForging& combined) {
-  const std::size_t n = joint.nodes.size();
-  std::vector<double> x(n);
-  std::vector<Eigen::Vector2d> yz(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    x[i] = static_cast<double>(i) * joint.step_mm;
-    yz[i] = {joint.nodes[i](kY), joint.nodes[i](kZ)};
-  }
-  const IdealAxis line = ideal_axis(x, yz, ends.first.x_mm, ends.last.x_mm, end_section_mm);
-  const Placement& world = joint.placements.front();
-  const Eigen::Vector3d direction(1.0, line.slope.x(), line.slope.y());
-  combined.R_forging_world = forging_axes(world.R.transpose() * direction);
-  combined.origin_world_mm = world.R.transpose() * (line.at(ends.first.x_mm) - world.shift_mm);
-  combined.length_mm = (ends.last.x_mm - ends.first.x_mm) * direction.norm();
-  const Eigen::Matrix3d R = combined.R_forging_world * world.R.transpose();  // aligned from working frame
-  const Eigen::Vector3d origin = line.at(ends.first.x_mm);
-
-  // The ideal axis is made of the same uncertain points: its sums go along.
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n) * kNodeUnknowns, 4);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto row = static_cast<Eigen::Index>(i) * kNodeUnknowns;
-    sums(row + kY, 0) = sums(row + kZ, 2) = line.level_weight[i];
-    sums(row + kY, 1) = sums(row + kZ, 3) = line.slope_weight[i];
-  }
-  const Eigen::MatrixXd with_sums = joint.system.covariance_with(sums);
-  const Eigen::Matrix4d of_sums = sums.transpose() * with_sums;
-  const double place_variance = ends.covariance_mm2(0, 0);
-
-  const double step = combined.length_mm / (sections - 1);
-  std::size_t k = 0;
-  std::vector<Eigen::Vector3d> aligned(n);
-  for (std::size_t i = 0; i < n; ++i) aligned[i] = R * (Eigen::Vector3d(x[i], yz[i].x(), yz[i].y()) - origin);
-  for (int s = 0; s < sections; ++s) {
-    CombinedSection section;
-    section.s_mm = s * step;
-    while (k + 2 < n && aligned[k + 1].x() < section.s_mm) ++k;
-    const double u = (section.s_mm - aligned[k].x()) / (aligned[k + 1].x() - aligned[k].x());
-    section.axis_mm = (1.0 - u) * aligned[k] + u * aligned[k + 1];
-    const std::size_t i = u < 0.5 ? k : k + 1;
-    const NodeVector& node = joint.nodes[i];
-    const NodeMatrix& covariance = joint.covariance[i];
-    const auto row = static_cast<Eigen::Index>(i) * kNodeUnknowns;
-    const double lever = x[i] - line.x_mean_mm;
-    Eigen::Matrix<double, 2, 4> line_effect;
-    line_effect << 1.0, lever, 0.0, 0.0, 0.0, 0.0, 1.0, lever;
-    Eigen::Matrix<double, 2, 4> cross;
-    cross.row(0) = with_sums.row(row + kY);
-    cross.row(1) = with_sums.row(row + kZ);
-    Eigen::Matrix2d own;
-    own << covariance(kY, kY), covariance(kY, kZ), covariance(kZ, kY), covariance(kZ, kZ);
-    const Eigen::Matrix2d shared = cross * line_effect.transpose();
-    section.axis_covariance_mm2 = own - shared - shared.transpose() + line_effect * of_sums * line_effect.transpose();
-
-    const double radius = (1.0 - u) * joint.nodes[k](kRadius) + u * joint.nodes[k + 1](kRadius);
-    // At a shoulder the section's place along the axis counts too.
-    const double gradient = (joint.nodes[k + 1](kRadius) - joint.nodes[k](kRadius)) / joint.step_mm;
-    const double from_place = gradient * gradient * (place_variance + joint.step_mm * joint.step_mm / 12.0);
-    section.diameter_mm = 2.0 * radius;
-    section.diameter_sigma_mm = 2.0 * std::sqrt(covariance(kRadius, kRadius) + from_place);
-    const Circularity circle = circularity(node, covariance);
-    section.circularity_mm = circle.value_mm;
-    section.circularity_sigma_mm = circle.sigma_mm;
-    combined.sections.push_back(section);
-  }
-}
-
 }  // namespace
 
 Result<void> CombineConfig::validate() const {
@@ -309,6 +241,7 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
     section.diameter_sigma_mm *= config.interval_widening;
     section.circularity_sigma_mm *= config.interval_widening;
   }
+  widen_draws(combined, config.interval_widening, 0.5 * common);
   const auto beyond = std::count_if(combined.sections.begin(), combined.sections.end(), [&](const auto& section) {
     return section.diameter_mm < 0.9 * forging.diameter_min_mm || section.diameter_mm > 1.1 * forging.diameter_max_mm;
   });

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "fusion/combine/section_shape.h"
 #include "fusion/triangulate/triangulate.h"
 
 namespace imprint {
@@ -27,6 +28,10 @@ struct CombinedForging {
   double length_mm = 0.0;
   double length_sigma_mm = 0.0;
   std::vector<CombinedSection> sections;  ///< 500, ascending s
+  ForgingShape shape;                     ///< of the sections; empty where only their means are known
+  /// Forgings that the tangents would show as well as this one: together they say how sure anything made of several
+  /// sections is. Empty where that is not known.
+  std::vector<ForgingShape> draws;
   std::vector<std::string> warnings;
 };
 

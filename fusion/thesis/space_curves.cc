@@ -74,14 +74,18 @@ std::vector<Rim> rims_beside(const std::vector<AxisGroup>& groups, std::span<con
   return rims;
 }
 
-/// Whether any rim runs steeper than 45 degrees to the axis from group i to the next: [D]'s segmentation keeps level
-/// edges only, and so the forging begins where the outline of its end face has become one.
+/// Whether half of the rims run steeper than 45 degrees to the axis from group i to the next: [D]'s segmentation keeps
+/// level edges only, and so the forging begins where the outline of its end face has become one.
 bool is_steep(const std::vector<AxisGroup>& groups, const std::vector<Rim>& rims, std::size_t i) {
   const double along = (groups[i + 1].point_mm - groups[i].point_mm).norm();
-  return std::ranges::any_of(rims, [&](const Rim& rim) {
+  int seen = 0, steep = 0;
+  for (const Rim& rim : rims) {
     const auto &a = rim.points_mm[i], &b = rim.points_mm[i + 1];
-    return a && b && std::abs((*b - groups[i + 1].point_mm).norm() - (*a - groups[i].point_mm).norm()) > along;
-  });
+    if (!a || !b) continue;
+    ++seen;
+    if (std::abs((*b - groups[i + 1].point_mm).norm() - (*a - groups[i].point_mm).norm()) > along) ++steep;
+  }
+  return 2 * steep >= std::max(seen, 1);
 }
 
 /// The groups between the end faces: from the first to one past the last.

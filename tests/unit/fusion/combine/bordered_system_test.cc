@@ -45,6 +45,17 @@ struct Twin {
 
 }  // namespace
 
+TEST_CASE("bordered_system: draws spread as the whole covariance says, across nodes too") {
+  Twin twin;
+  REQUIRE(twin.system.solve());
+  const Eigen::MatrixXd inverse = twin.dense.inverse();
+  // One column of normal values for each unknown: their outer products add up to the covariance itself.
+  const Eigen::MatrixXd draws = twin.system.deviations(Eigen::MatrixXd::Identity(kSize, kSize));
+  const Eigen::MatrixXd spread = draws * draws.transpose();
+  const Eigen::MatrixXd expected = inverse.topLeftCorner(kSize - kBorder, kSize - kBorder);
+  CHECK((spread - expected).cwiseAbs().maxCoeff() < 1e-9 * expected.cwiseAbs().maxCoeff());
+}
+
 TEST_CASE("bordered_system: solution and covariances are those of the dense system") {
   Twin twin;
   REQUIRE(twin.system.solve());
