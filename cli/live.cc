@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <condition_variable>
 #include <iostream>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include "cli/line_link.h"
 #include "cli/result_table.h"
 #include "fusion/results/measurement.h"
+#include "lib/clock/wall_clock.h"
 #include "lib/daemon/bounded_queue.h"
 #include "lib/daemon/stop_signal.h"
 #include "lib/wire/wire.h"
@@ -54,6 +56,12 @@ void print_camera(const json& camera) {
                              health["age_s"].get<double>());
     if (const auto error = health["last_error"].get<std::string>(); !error.empty())
       std::cout << "; last error: " << error;
+  }
+  if (const json& delivery = camera["delivery"]; delivery.is_object()) {
+    if (delivery["missing"] != 0)
+      std::cout << "; MISSING imprint(s) number " << delivery["missing_numbers"].get<std::string>();
+    if (const json& node = delivery["node"]; node.is_object() && node["waiting"] != 0)
+      std::cout << fmt::format("; {} imprint(s) wait in the node", node["waiting"].get<int>());
   }
   std::cout << '\n';
 }
@@ -228,6 +236,7 @@ int run_watch(const WatchOptions& options, bool as_json) {
 struct TriggerOptions {
   LineOptions line;
   Trigger trigger;
+  double fire_in_s = 0.0;
   std::optional<double> wait_s;
 };
 
@@ -301,7 +310,8 @@ int print_result(const json& session_result, bool as_json) {
 }
 
 int run_trigger(const TriggerOptions& options, bool as_json) {
-  const Trigger& trigger = options.trigger;
+  Trigger trigger = options.trigger;
+  if (options.fire_in_s > 0.0) trigger.fire_at_ns = wall_clock_ns() + std::llround(1e9 * options.fire_in_s);
   if (const auto valid = check_id("session", trigger.session); !valid) return fail(valid.error());
   const auto link = LineLink::open(options.line);
   if (!link) return fail(link.error());
@@ -378,6 +388,8 @@ void add_live_commands(Cli& cli) {
       ->check(between(-3600, 3600));
   trigger->add_option("--expect", trigger_options->trigger.observations_expected, "observations this session will have")
       ->check(between(1, 1e6));
+  trigger->add_option("--in", trigger_options->fire_in_s, "s from now at which all cameras fire; else at once")
+      ->check(between(0, 60));
   trigger
       ->add_option("--wait", trigger_options->wait_s, "s to wait for the result; exit status 1 when it does not come")
       ->check(between(0.1, 86'400));

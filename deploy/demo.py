@@ -62,7 +62,7 @@ class Plant:
         for camera in self.cameras:
             self.start(camera, "imprint-node", ROOT / "firmware_config" / "node.toml", node__camera_id=f'"{camera}"',
                        node__rig=f'"{self.rig}"', capture__source='"session"', capture__path=f'"{self.folder / "session.toml"}"',
-                       zenoh__connect=f'["{self.endpoint}"]')
+                       node__data_dir=f'"{self.folder / "nodes"}"', zenoh__connect=f'["{self.endpoint}"]')
         return self
 
     def __exit__(self, *_):

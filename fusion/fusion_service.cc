@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "fusion/serve/query_answer.h"
 #include "lib/clock/wall_clock.h"
-#include "lib/config/atomic_file.h"
 #include "lib/log/log.h"
 
 namespace imprint {
@@ -11,34 +11,19 @@ namespace {
 
 constexpr std::size_t kMaxQueued = 2048;
 constexpr std::size_t kMaxQueuedQueries = 64;
-constexpr std::size_t kMaxMessageBytes = 64 * 1024;  // sixteen times the largest imprint
+constexpr std::size_t kMaxMessageBytes = 16 * 1024;  // four times the largest imprint
 constexpr std::size_t kMaxInOneGo = 256;             // messages before deadlines are looked at again
-constexpr std::size_t kImprintHistory = 256;         // asked of each node on start
+constexpr std::size_t kImprintHistory = 16;          // asked of each node on start; the rest is in its spool
 constexpr std::size_t kTriggerHistory = 16;
-constexpr std::size_t kPublishedSessions = 16;  // whose last result a late watcher still gets
+constexpr std::size_t kMaxQueuedLiveness = 256;
+constexpr int kResultFilesChecked = 100;
 constexpr auto kIdleWait = std::chrono::seconds(1);
 constexpr auto kRetryWait = std::chrono::milliseconds(500);
-
-std::string parameter(std::string_view parameters, std::string_view name) {
-  while (!parameters.empty()) {
-    const auto end = std::min(parameters.find(';'), parameters.size());
-    const std::string_view pair = parameters.substr(0, end);
-    if (pair.starts_with(name) && pair.size() > name.size() && pair[name.size()] == '=') {
-      return std::string(pair.substr(name.size() + 1));
-    }
-    parameters.remove_prefix(std::min(end + 1, parameters.size()));
-  }
-  return {};
-}
 
 std::vector<std::string> camera_ids(const Rig& rig) {
   std::vector<std::string> ids;
   for (const CameraModel& camera : rig.cameras) ids.push_back(camera.id);
   return ids;
-}
-
-std::span<const std::uint8_t> bytes_of(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 }  // namespace
@@ -53,12 +38,17 @@ FusionService::FusionService(FusionConfig config, Rig rig, Transport& transport,
       fuse_(std::move(fuse)),
       assembler_(camera_ids(rig_), config_.assembler),
       queue_(std::make_shared<BoundedQueue<Message>>(kMaxQueued)),
+      liveness_(std::make_shared<BoundedQueue<Message>>(kMaxQueuedLiveness)),
       queries_(std::make_shared<BoundedQueue<std::shared_ptr<Query>>>(kMaxQueuedQueries)) {}
 
 Result<void> FusionService::start() {
   auto keys = Keys::of(config_.site, config_.line);
   if (!keys) return pass_on(keys.error());
   keys_ = std::make_shared<Keys>(std::move(*keys));
+  auto desk = DeliveryDesk::open(transport_, *keys_, camera_ids(rig_), store_, board_);
+  if (!desk) return pass_on(desk.error());
+  desk_.emplace(std::move(*desk));
+  announcer_.emplace(transport_, *keys_, config_.result_dir, board_);
   if (const auto latest = store_.latest_result(); latest && latest->has_value()) board_.set_result(**latest);
   if (auto subscribed = subscribe(); !subscribed) {
     declarations_.clear();
@@ -78,8 +68,9 @@ Result<void> FusionService::subscribe() {
     board_.count("missed", count);
     spdlog::warn("{} message(s) of {} were lost on the way", count, source);
   };
-  const auto on_liveness = [queue = queue_](std::string_view key, bool alive) {
-    queue->push({alive ? Kind::alive : Kind::gone, std::string(key), {}});
+  const auto on_liveness = [queue = queue_, liveness = liveness_](std::string_view key, bool alive) {
+    liveness->push({alive ? Kind::alive : Kind::gone, std::string(key), {}});
+    queue->push({Kind::wake, {}, {}});  // a full queue needs no waking
   };
   const auto on_query = [queries = queries_](std::shared_ptr<Query> query) {
     if (!queries->push(query)) (void)query->reply_error("busy");
@@ -88,6 +79,7 @@ Result<void> FusionService::subscribe() {
       transport_.subscribe(keys_->trigger(), {.history = kTriggerHistory}, queueing(Kind::trigger), on_miss),
       transport_.subscribe(keys_->imprint(), {.history = kImprintHistory}, queueing(Kind::imprint), on_miss),
       transport_.subscribe(keys_->health(), {.history = 0}, queueing(Kind::health)),
+      transport_.subscribe(keys_->delivery(), {.history = 0}, queueing(Kind::delivery)),
       transport_.watch_liveness(keys_->alive(), on_liveness),
       transport_.answer(keys_->fusion_service("status"), on_query),
       transport_.answer(keys_->fusion_service("result"), on_query),
@@ -120,25 +112,38 @@ void FusionService::stop() {
 }
 
 void FusionService::work() {
-  const auto unfinished = store_.unfinished(static_cast<int>(config_.assembler.max_sessions));
-  if (!unfinished) spdlog::error("{}", unfinished.error().message);
-  for (const std::string& session : unfinished.value_or(std::vector<std::string>{})) {
-    spdlog::info("session {}: not finished when this program last ended; taken up again", session);
-    recall(session);
-    show_session(session);
+  // Only the newest of those that are merely not complete: what they still wait for may come.
+  for (auto sessions : {store_.unevaluated(), store_.unfinished(static_cast<int>(config_.assembler.max_sessions))}) {
+    if (!sessions) spdlog::error("{}", sessions.error().message);
+    for (std::string& session : sessions.value_or(std::vector<std::string>{})) {
+      if (std::ranges::find(backlog_, session) != backlog_.end()) continue;
+      spdlog::info("session {}: not finished when this program last ended; taken up again", session);
+      backlog_.push_back(std::move(session));
+    }
   }
-  evaluate();
+  if (const auto results = store_.sessions(kResultFilesChecked)) {  // ended between the database and the file
+    for (const SessionSummary& summary : *results) {
+      ++turns_;
+      if (const auto result = store_.result(summary.session); result && result->has_value())
+        announcer_->write_file(**result);
+    }
+  }
   while (!queue_->finished()) {
     ++turns_;
+    take_up_backlog();
+    evaluate();
     const Time idle_until = std::chrono::steady_clock::now() + kIdleWait;
-    auto message = queue_->pop_until(std::min(assembler_.next_deadline().value_or(idle_until), idle_until));
+    const bool more = !backlog_.empty() && assembler_.has_room();
+    auto message = more ? queue_->try_pop()
+                        : queue_->pop_until(std::min(assembler_.next_deadline().value_or(idle_until), idle_until));
     for (std::size_t i = 0; message && i < kMaxInOneGo; ++i) {
       handle(*message);
       message = queue_->try_pop();
     }
     if (message) handle(*message);
-    evaluate();
+    while (const auto change = liveness_->try_pop()) handle(*change);
   }
+  evaluate();
 }
 
 void FusionService::handle(const Message& message) {
@@ -150,6 +155,10 @@ void FusionService::handle(const Message& message) {
       return receive_imprint(message);
     case Kind::health:
       return receive_health(message);
+    case Kind::delivery:
+      return receive_delivery(message);
+    case Kind::wake:
+      return;
     case Kind::alive:
     case Kind::gone:
       if (const auto camera = keys_->camera_of(message.key)) receive_liveness(*camera, message.kind == Kind::alive);
@@ -182,17 +191,21 @@ void FusionService::receive_imprint(const Message& message) {
   }
   if (const auto valid = check_id("session", imprint->session); !valid)
     return malformed(message, valid.error().message);
-  if (rig_.find_camera(imprint->camera_id) == nullptr || imprint->observation >= config_.assembler.max_observations) {
+  const bool known = rig_.find_camera(imprint->camera_id) != nullptr;
+  if (!known || imprint->observation >= config_.assembler.max_observations) {
+    const std::string why =
+        known ? fmt::format("a session has at most {} observations", config_.assembler.max_observations)
+              : "the rig has no such camera";
     board_.count("refused");
-    spdlog::warn(
-        "imprint of camera {} for session {} observation {} refused: {}", imprint->camera_id, imprint->session,
-        imprint->observation,
-        rig_.find_camera(imprint->camera_id) == nullptr ? "the rig has no such camera" : "no such observation");
+    spdlog::warn("imprint of camera {} for session {} observation {} refused: {}", imprint->camera_id, imprint->session,
+                 imprint->observation, why);
+    if (known) desk_->refused(*imprint, why);  // a camera may still be added to the rig: its node keeps what it has
     return;
   }
   bool is_new = false;
   if (!surely<bool>([&] { return store_.add_imprint(*imprint, message.bytes, wall_clock_ns()); }, is_new)) return;
   board_.count(is_new ? "imprints" : "repeated");
+  desk_->stored(*imprint, is_new);
   if (!is_new) return;
   const Time now = std::chrono::steady_clock::now();
   board_.note_imprint(*imprint, now);
@@ -217,6 +230,15 @@ void FusionService::receive_health(const Message& message) {
     return malformed(message, fmt::format("carries the health of camera {}", health->camera_id));
   }
   if (const auto raised = board_.set_health(*health, std::chrono::steady_clock::now())) spdlog::error("{}", *raised);
+}
+
+void FusionService::receive_delivery(const Message& message) {
+  const auto delivery = decode_delivery(message.bytes);
+  if (!delivery) return malformed(message, delivery.error().message);
+  if (keys_->camera_of(message.key) != delivery->camera_id) {
+    return malformed(message, fmt::format("carries the report of camera {}", delivery->camera_id));
+  }
+  desk_->receive(*delivery, std::chrono::steady_clock::now());
 }
 
 void FusionService::receive_liveness(const std::string& camera_id, bool alive) {
@@ -262,8 +284,17 @@ void FusionService::evaluate() {
   for (const std::string& session : assembler_.settle(std::chrono::steady_clock::now())) make_result(session);
 }
 
-void FusionService::make_result(const std::string& session) {
-  ++turns_;
+void FusionService::take_up_backlog() {
+  for (std::string& session : assembler_.take_displaced()) backlog_.push_back(std::move(session));
+  if (backlog_.empty() || !assembler_.has_room()) return;
+  const std::string session = std::move(backlog_.front());
+  backlog_.pop_front();
+  if (assembler_.knows(session)) return;
+  recall(session);
+  show_session(session);
+}
+
+StoredResult FusionService::evaluated(const std::string& session) {
   StoredResult result;
   result.session = session;
   result.complete = assembler_.complete(session);
@@ -276,56 +307,36 @@ void FusionService::make_result(const std::string& session) {
       measurement->line = config_.site + "/" + config_.line;
       measurement->made_at = utc_text(result.made_ns);
       result.json = to_json(*measurement).dump();
+      // What was made again and is the same as before is the same result.
+      if (const auto before = store_.result(session); before && before->has_value()) {
+        measurement->made_at = utc_text((*before)->made_ns);
+        if (auto again = to_json(*measurement).dump(); again == (*before)->json) result.json = std::move(again);
+      }
     } else {
       result.error = measurement.error().message;
     }
   } catch (const std::exception& error) {  // a fault of ours or of a library must not end the line's only fusion
+    result.json.clear();
     result.error = fmt::format("unexpected: {}", error.what());
   }
+  return result;
+}
+
+void FusionService::make_result(const std::string& session) {
+  ++turns_;
+  StoredResult result = evaluated(session);
+  const auto before = store_.revision(session);
   if (!surely<std::int64_t>([&] { return store_.put_result(result); }, result.revision)) return;
-  if (result.error.empty()) {
+  if (before && *before == result.revision) {
+    spdlog::info("session {}: made again, the same as result {}", session, result.revision);
+  } else if (result.error.empty()) {
     spdlog::info("session {}: result {} stored, {}", session, result.revision,
                  result.complete ? "complete" : "not complete yet");
   } else {
     spdlog::warn("session {}: no measurement: {}", session, result.error);
   }
-  board_.count("results");
-  write_result_file(result);
-  announce(result);
-  board_.set_result(result);
+  if (!before || *before != result.revision) announcer_->announce(result);
   show_session(session);
-}
-
-void FusionService::announce(const StoredResult& result) {
-  auto publisher = result_publishers_.find(result.session);
-  if (publisher == result_publishers_.end()) {
-    auto opened = transport_.publish(keys_->result(result.session), {.traffic = Traffic::bulk, .history = 1});
-    if (!opened) {
-      spdlog::error("session {}: {}", result.session, opened.error().message);
-      return;
-    }
-    if (published_sessions_.size() >= kPublishedSessions) {
-      result_publishers_.erase(published_sessions_.front());
-      published_sessions_.pop_front();
-    }
-    published_sessions_.push_back(result.session);
-    publisher = result_publishers_.emplace(result.session, std::move(*opened)).first;
-  }
-  const auto sent = publisher->second->put(encode_result({result.session, result.complete, result.error, result.json}));
-  if (!sent) spdlog::error("session {}: {}", result.session, sent.error().message);
-}
-
-void FusionService::write_result_file(const StoredResult& result) {
-  if (config_.result_dir.empty() || result.json.empty()) return;
-  const std::filesystem::path folder = config_.result_dir / result.session;
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    board_.set_alarm("result_dir", fmt::format("{}: {}", folder.string(), error.message()));
-    return;
-  }
-  const auto written = write_file_atomically(folder / "result.json", result.json + "\n");
-  board_.set_alarm("result_dir", written ? "" : written.error().message);
 }
 
 void FusionService::show_session(const std::string& session) {
@@ -357,21 +368,8 @@ bool FusionService::surely(const std::function<Result<T>()>& write, T& outcome) 
 
 void FusionService::answer_queries() {
   while (auto query = queries_->pop()) {
-    Result<void> replied;
-    if ((*query)->key() == keys_->fusion_service("status")) {
-      replied = (*query)->reply(bytes_of(board_.status(std::chrono::steady_clock::now()).dump()));
-    } else {
-      const std::string session = parameter((*query)->parameters(), "session");
-      const auto result = session.empty() ? store_.latest_result() : store_.result(session);
-      if (!result) {
-        replied = (*query)->reply_error(result.error().message);
-      } else if (!result->has_value()) {
-        replied = (*query)->reply_error(session.empty() ? "no result yet" : "no result of session " + session);
-      } else {
-        replied = (*query)->reply(bytes_of(to_json(**result).dump()));
-      }
-    }
-    if (!replied) spdlog::warn("{}", replied.error().message);
+    if (auto replied = answer_query(**query, *keys_, board_, store_); !replied)
+      spdlog::warn("{}", replied.error().message);
   }
 }
 

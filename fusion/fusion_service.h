@@ -5,15 +5,17 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "fusion/delivery_desk.h"
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_pipeline.h"
 #include "fusion/receive/observation_assembler.h"
+#include "fusion/result_announcer.h"
 #include "fusion/serve/line_board.h"
 #include "fusion/store/session_store.h"
 #include "lib/daemon/bounded_queue.h"
@@ -27,7 +29,8 @@ using Fuse = std::function<Result<Measurement>(const std::vector<Observation>&, 
                                                std::string method)>;
 
 /// The running fusion node: imprints and triggers come in, are stored, assembled and fused; each result is stored
-/// before it is announced. One worker thread does all of it in order; callbacks only queue.
+/// before it is announced. One worker thread does all of it in order; callbacks only queue. A node hears of every
+/// imprint that is on disk, and sends those again of which it does not.
 ///
 /// Fusion is the memory of the line's triggers: nodes keep none. A camera that connects while an observation still
 /// waits for it is sent the trigger again.
@@ -47,7 +50,7 @@ class FusionService {
   [[nodiscard]] std::uint64_t turns() const { return turns_; }
 
  private:
-  enum class Kind { trigger, imprint, health, alive, gone };
+  enum class Kind { trigger, imprint, health, delivery, alive, gone, wake };
   struct Message {
     Kind kind;
     std::string key;
@@ -62,13 +65,15 @@ class FusionService {
   void receive_trigger(const Message& message);
   void receive_imprint(const Message& message);
   void receive_health(const Message& message);
+  void receive_delivery(const Message& message);
   void receive_liveness(const std::string& camera_id, bool alive);
   /// Puts a stored session back into the assembler, each message as old as it is.
   void recall(const std::string& session);
   void evaluate();
   void make_result(const std::string& session);
-  void announce(const StoredResult& result);
-  void write_result_file(const StoredResult& result);
+  /// Brings back, one a turn, the sessions whose result was due when this program last ended or when they had to leave.
+  void take_up_backlog();
+  [[nodiscard]] StoredResult evaluated(const std::string& session);
   void show_session(const std::string& session);
   void malformed(const Message& message, const std::string& why);
   void answer_queries();
@@ -85,10 +90,12 @@ class FusionService {
   Fuse fuse_;
   ObservationAssembler assembler_;
   std::shared_ptr<Keys> keys_;
+  std::optional<DeliveryDesk> desk_;
+  std::optional<ResultAnnouncer> announcer_;
+  std::deque<std::string> backlog_;  // sessions whose result may be due, but whose imprints are only in the store
   std::shared_ptr<BoundedQueue<Message>> queue_;
+  std::shared_ptr<BoundedQueue<Message>> liveness_;  // of their own, so that a flood of messages cannot hide them
   std::shared_ptr<BoundedQueue<std::shared_ptr<Query>>> queries_;
-  std::map<std::string, std::unique_ptr<Publisher>> result_publishers_;
-  std::deque<std::string> published_sessions_;  // the oldest first
   std::unique_ptr<Publisher> trigger_publisher_;
   std::vector<std::unique_ptr<Declaration>> declarations_;
   std::atomic<bool> stopping_ = false;

@@ -7,6 +7,7 @@
 #include "lib/log/log.h"
 #include "node/node_config.h"
 #include "node/node_service.h"
+#include "node/replay/imprint_replay.h"
 
 namespace imprint {
 namespace {
@@ -51,7 +52,9 @@ Result<void> run(const ProgramOptions& options) {
   }
   const auto method = edge_method_from_name(config->method);
   if (!method) return pass_on(method.error());
-  const auto source = open_frame_source(config->capture_source, config->capture_path, config->camera_id);
+  const bool replay = config->capture_source == "imprints";
+  const auto source = replay ? open_imprint_replay(config->capture_path, config->camera_id)
+                             : open_frame_source(config->capture_source, config->capture_path, config->camera_id);
   if (!source) return pass_on(source.error());
   if (options.check) {
     std::cout << options.config.string() << ": OK\n";
@@ -63,7 +66,10 @@ Result<void> run(const ProgramOptions& options) {
   if (!transport) return pass_on(transport.error());
   PoseKeeper keeper;  // called by the service's one worker alone
   NodeService service(
-      *config, **source, [&](const Frame& frame) { return process_frame(frame, *camera, *rig, *method, &keeper); },
+      *config, **source,
+      [&](const Frame& frame) {
+        return replay ? replayed_imprint(frame) : process_frame(frame, *camera, *rig, *method, &keeper);
+      },
       **transport);
   if (auto started = service.start(); !started) return started;
   spdlog::info("camera {} of {}/{} ready, frames from {} {}", config->camera_id, config->site, config->line,

@@ -1,27 +1,51 @@
 #include "node/node_config.h"
 
+#include <algorithm>
+#include <array>
+
 #include "lib/daemon/program.h"
 #include "node/capture/frame_source.h"
 
 namespace imprint {
+namespace {
+
+// Frame sources, and ready imprints in place of frames.
+constexpr auto kSources = [] {
+  std::array<std::string_view, kFrameSources.size() + 1> sources{};
+  std::ranges::copy(kFrameSources, sources.begin());
+  sources.back() = "imprints";
+  return sources;
+}();
+
+}  // namespace
 
 Result<NodeConfig> read_node_config(const std::filesystem::path& path, const toml::table& table) {
   NodeConfig config;
   TomlReader read(path, table);
   read.only({"node.site", "node.line", "node.camera_id", "node.rig", "node.method", "node.log_level", "capture.source",
-             "capture.path", "zenoh.connect", "zenoh.listen", "health.period_s"});
+             "capture.path", "zenoh.connect", "zenoh.listen", "health.period_s", "node.data_dir", "spool.max_mb",
+             "spool.retry_s"});
   config.site = read_id(read, "node.site", config.site);
   config.line = read_id(read, "node.line", config.line);
   config.camera_id = read_id(read, "node.camera_id", std::nullopt);
   config.rig = read.path("node.rig");
   config.method = read_choice(read, "node.method", kMethods, config.method);
   config.log_level = read_choice(read, "node.log_level", kLogLevels, config.log_level);
-  config.capture_source = read_choice(read, "capture.source", kFrameSources, std::nullopt);
+  config.capture_source = read_choice(read, "capture.source", kSources, std::nullopt);
   config.capture_path = read.path("capture.path");
   config.zenoh = read_zenoh_section(read, config.zenoh);
   config.health_period_s = read.number("health.period_s", config.health_period_s);
   if (!(config.health_period_s >= 0.1 && config.health_period_s <= 3600.0)) {
     read.fault("health.period_s", fmt::format("expected 0.1 to 3600 s, found {}", config.health_period_s));
+  }
+  config.data_dir = read.path("node.data_dir", std::filesystem::absolute(path).parent_path() / "imprint-data");
+  config.spool_max_mb = read.integer("spool.max_mb", config.spool_max_mb);
+  if (config.spool_max_mb < 1 || config.spool_max_mb > 1'000'000) {
+    read.fault("spool.max_mb", fmt::format("expected 1 to 1000000 MB, found {}", config.spool_max_mb));
+  }
+  config.retry_s = read.number("spool.retry_s", config.retry_s);
+  if (!(config.retry_s >= 0.1 && config.retry_s <= 60.0)) {
+    read.fault("spool.retry_s", fmt::format("expected 0.1 to 60 s, found {}", config.retry_s));
   }
   if (config.zenoh.connect.empty() && config.zenoh.listen.empty()) {
     read.fault("zenoh.connect", "no endpoint here nor in zenoh.listen: fusion could not be reached");
@@ -32,12 +56,13 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
 
 std::string to_toml(const NodeConfig& config) {
   return fmt::format(
-      "[node]\nsite = {}\nline = {}\ncamera_id = {}\nrig = {}\nmethod = {}\nlog_level = {}\n\n"
-      "[capture]\nsource = {}\npath = {}\n\n[zenoh]\nconnect = {}\nlisten = {}\n\n[health]\nperiod_s = {}\n",
+      "[node]\nsite = {}\nline = {}\ncamera_id = {}\nrig = {}\nmethod = {}\nlog_level = {}\n"
+      "data_dir = {}\n\n[spool]\nmax_mb = {}\nretry_s = {}\n\n[capture]\nsource = {}\npath = {}\n\n[zenoh]\nconnect = "
+      "{}\nlisten = {}\n\n[health]\nperiod_s = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.camera_id), toml_text(config.rig.string()),
-      toml_text(config.method), toml_text(config.log_level), toml_text(config.capture_source),
-      toml_text(config.capture_path.string()), toml_list(config.zenoh.connect), toml_list(config.zenoh.listen),
-      toml_number(config.health_period_s));
+      toml_text(config.method), toml_text(config.log_level), toml_text(config.data_dir.string()), config.spool_max_mb,
+      toml_number(config.retry_s), toml_text(config.capture_source), toml_text(config.capture_path.string()),
+      toml_list(config.zenoh.connect), toml_list(config.zenoh.listen), toml_number(config.health_period_s));
 }
 
 }  // namespace imprint

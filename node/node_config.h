@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -17,10 +18,13 @@ struct NodeConfig {
   std::filesystem::path rig;
   std::string method = "best";
   std::string log_level = "info";
-  std::string capture_source;          // folder, session or simulation
+  std::string capture_source;          // folder, session, simulation or imprints
   std::filesystem::path capture_path;  // the folder, the session.toml or the scene
   ZenohConfig zenoh{.connect = {"tcp/127.0.0.1:7447"}, .listen = {}, .router = false};
   double health_period_s = 5.0;
+  std::filesystem::path data_dir;   // imprints wait below it for fusion's receipt; empty: in memory alone
+  std::int64_t spool_max_mb = 256;  // of imprints that wait, then the oldest end; ours: 65,000 imprints
+  double retry_s = 5.0;             // an imprint without a receipt for so long is sent again
 };
 
 /// Reads the table of `node.toml`; `path` is what relative paths and messages refer to.

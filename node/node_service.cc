@@ -14,7 +14,16 @@ using std::chrono::steady_clock;
 constexpr std::size_t kMaxQueuedTriggers = 64;
 constexpr std::size_t kMaxTriggerBytes = 4096;
 constexpr std::size_t kRememberedAnswers = 1024;
+constexpr std::size_t kMaxErrorBytes = 80;           // of the health record
 constexpr auto kMaxLead = std::chrono::seconds(60);  // a moment further ahead means clocks that disagree
+
+// Not in the middle of a UTF-8 character.
+std::string cut(std::string text, std::size_t max_bytes) {
+  if (text.size() <= max_bytes) return text;
+  while (max_bytes > 0 && (static_cast<unsigned char>(text[max_bytes]) & 0xC0U) == 0x80U) --max_bytes;
+  text.resize(max_bytes);
+  return text;
+}
 
 std::int64_t nanoseconds(auto duration) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count();
@@ -35,9 +44,21 @@ NodeService::NodeService(NodeConfig config, FrameSource& source, ProcessFrame pr
 Result<void> NodeService::start() {
   const auto keys = Keys::of(config_.site, config_.line);
   if (!keys) return pass_on(keys.error());
-  auto publisher = ImprintPublisher::open(transport_, *keys, config_.camera_id, make_boot_id());
-  if (!publisher) return pass_on(publisher.error());
-  publisher_ = std::move(*publisher);
+  health_.boot_id = make_boot_id();
+  auto spool = ImprintSpool::open(config_.data_dir.empty() ? config_.data_dir : config_.data_dir / config_.camera_id,
+                                  static_cast<std::size_t>(config_.spool_max_mb) << 20U);
+  if (!spool) return pass_on(spool.error());
+  auto courier = ImprintCourier::start(transport_, *keys, config_.camera_id, health_.boot_id, std::move(*spool),
+                                       {.first_timeout_s = config_.retry_s});
+  if (!courier) return pass_on(courier.error());
+  courier_ = std::move(*courier);
+  for (auto& answer : courier_->answered_before()) {
+    if (answered_.size() >= kRememberedAnswers) answered_.pop_front();
+    answered_.push_back(std::move(answer));
+  }
+  auto health = transport_.publish(keys->health(config_.camera_id), {.traffic = Traffic::health, .history = 0});
+  if (!health) return pass_on(health.error());
+  health_publisher_ = std::move(*health);
 
   auto subscribed = transport_.subscribe(keys->trigger(), {.history = 0}, [queue = triggers_](const Sample& sample) {
     if (sample.payload.size() > kMaxTriggerBytes || !queue->push(sample.payload)) {
@@ -144,12 +165,12 @@ Imprint NodeService::make_imprint(const Trigger& trigger) {
 }
 
 void NodeService::note(const Imprint& imprint) {
+  courier_->send(imprint);
   {
-    const std::lock_guard lock(publish_mutex_);
-    if (auto sent = publisher_->send(imprint); !sent) spdlog::error("imprint not sent: {}", sent.error().message);
+    const std::lock_guard lock(health_mutex_);
     ++health_.frames;
     if (!imprint.failure.empty()) ++health_.failed_frames;
-    health_.last_error = imprint.failure;
+    health_.last_error = cut(imprint.failure, kMaxErrorBytes);
     health_.targets_seen = imprint.quality.targets_seen;
     health_.reprojection_rms_px = imprint.quality.reprojection_rms_px;
     health_.contrast = imprint.quality.contrast;
@@ -166,10 +187,15 @@ void NodeService::note(const Imprint& imprint) {
 }
 
 void NodeService::send_health() {
-  const std::lock_guard lock(publish_mutex_);
-  if (!publisher_) return;
-  health_.time_ns = wall_clock_ns();
-  if (auto sent = publisher_->send(health_); !sent) spdlog::warn("health not sent: {}", sent.error().message);
+  if (!courier_ || !health_publisher_) return;
+  {
+    const std::lock_guard lock(health_mutex_);
+    health_.time_ns = wall_clock_ns();
+    health_.sequence = courier_->sequence();
+    if (auto sent = health_publisher_->put(encode_health(health_)); !sent)
+      spdlog::warn("health not sent: {}", sent.error().message);
+  }
+  courier_->report();
 }
 
 }  // namespace imprint

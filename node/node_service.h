@@ -19,7 +19,7 @@
 #include "node/capture/frame_source.h"
 #include "node/node_config.h"
 #include "node/node_pipeline.h"
-#include "node/publish/imprint_publisher.h"
+#include "node/publish/imprint_courier.h"
 
 namespace imprint {
 
@@ -27,11 +27,13 @@ namespace imprint {
 using ProcessFrame = std::function<ProcessedFrame(const Frame&)>;
 
 /// The running camera node: a trigger comes in, a frame is taken and worked on, its imprint goes out; a failed one
-/// too, so that fusion need not wait. One worker thread does it; the transport's callback only queues.
+/// too, so that fusion need not wait. One worker thread does it; the transport's callback only queues. The imprint
+/// stays on disk until fusion has it on its own.
 ///
 /// Triggers are taken live, without history: a node that starts late does not fire at what has long been moved away.
 /// Fusion sends a trigger again to a camera that connects while it is still waited for. A trigger that this node has
-/// answered well is not answered again; one that failed is.
+/// answered well, now or before a restart as long as the imprint waits on its disk, is not answered again; one that
+/// failed is.
 class NodeService {
  public:
   NodeService(NodeConfig config, FrameSource& source, ProcessFrame process, Transport& transport);
@@ -42,7 +44,8 @@ class NodeService {
   Result<void> start();
   /// Ends after the frame that is being worked on.
   void stop();
-  /// Sends the health record; due every `health_period_s`, and done by itself after every frame.
+  /// Sends the health record and what waits for fusion; due every `health_period_s`, and done by itself after every
+  /// frame.
   void send_health();
   /// Whether one frame has been worked on for longer than `limit`: the worker hangs.
   [[nodiscard]] bool stuck(std::chrono::seconds limit) const;
@@ -62,8 +65,9 @@ class NodeService {
   std::shared_ptr<BoundedQueue<Bytes>> triggers_;
   std::deque<std::pair<std::string, std::uint32_t>> answered_;  // session, observation; the oldest first
 
-  std::mutex publish_mutex_;  // guards the publisher and the health record
-  std::optional<ImprintPublisher> publisher_;
+  std::unique_ptr<ImprintCourier> courier_;
+  std::mutex health_mutex_;  // guards the health record and its publisher
+  std::unique_ptr<Publisher> health_publisher_;
   Health health_;
 
   std::vector<std::unique_ptr<Declaration>> declarations_;

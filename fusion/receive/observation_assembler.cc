@@ -236,13 +236,21 @@ std::vector<std::string> ObservationAssembler::sessions() const {
   return names;
 }
 
+bool ObservationAssembler::has_room() const {
+  const auto open = std::ranges::count_if(sessions_, [](const auto& entry) { return is_open(entry.second); });
+  return static_cast<std::size_t>(open) < config_.max_sessions;
+}
+
+bool ObservationAssembler::is_open(const Session& session) {
+  return session.due ||
+         std::ranges::any_of(session.observations, [](const auto& entry) { return !entry.second.settled; });
+}
+
 ObservationAssembler::Session& ObservationAssembler::open_session(const std::string& name, Time now) {
   if (!sessions_.contains(name) && sessions_.size() >= config_.max_sessions) {
-    const auto has_open = [](const Session& session) {
-      return std::ranges::any_of(session.observations, [](const auto& entry) { return !entry.second.settled; });
-    };
     const auto leave_first = std::ranges::min_element(
-        sessions_, {}, [&](const auto& entry) { return std::pair(has_open(entry.second), entry.second.touched); });
+        sessions_, {}, [&](const auto& entry) { return std::pair(is_open(entry.second), entry.second.touched); });
+    if (is_open(leave_first->second)) displaced_.push_back(leave_first->first);
     sessions_.erase(leave_first);
   }
   Session& session = sessions_[name];

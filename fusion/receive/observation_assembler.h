@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fusion/receive/observation.h"
@@ -83,6 +84,11 @@ class ObservationAssembler {
   /// Triggers of observations that have not settled and still lack an imprint of this camera.
   [[nodiscard]] std::vector<Trigger> open_triggers(const std::string& camera_id) const;
   [[nodiscard]] std::vector<std::string> sessions() const;
+  /// Sessions that had to leave for want of room before their result was made; each is given once. Whoever keeps their
+  /// messages brings them back when `has_room`.
+  std::vector<std::string> take_displaced() { return std::exchange(displaced_, {}); }
+  /// Whether a session more would displace none that waits for its result.
+  [[nodiscard]] bool has_room() const;
 
  private:
   struct Pending {
@@ -101,6 +107,7 @@ class ObservationAssembler {
     std::set<std::string> warnings;
   };
 
+  [[nodiscard]] static bool is_open(const Session& session);
   Session& open_session(const std::string& name, Time now);
   Pending& open_observation(Session& session, std::uint32_t index, double rotation_deg, Time now);
   [[nodiscard]] const Session* find(const std::string& session) const;
@@ -111,6 +118,7 @@ class ObservationAssembler {
   AssemblerConfig config_;
   std::set<std::string> alive_;
   std::map<std::string, Session> sessions_;
+  std::vector<std::string> displaced_;
 };
 
 }  // namespace imprint

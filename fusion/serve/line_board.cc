@@ -34,6 +34,17 @@ json health_json(const Health& health, double age) {
           {"version", health.version}};
 }
 
+json delivery_json(const Delivery& delivery, double age) {
+  return {{"age_s", age},
+          {"boot_id", hex(delivery.boot_id)},
+          {"sequence", delivery.sequence},
+          {"waiting", delivery.waiting},
+          {"waiting_bytes", delivery.waiting_bytes},
+          {"discarded", delivery.discarded},
+          {"refused", delivery.refused},
+          {"fault", delivery.fault}};
+}
+
 json imprint_json(const Imprint& imprint, double age) {
   return {{"session", imprint.session},
           {"observation", imprint.observation},
@@ -81,7 +92,7 @@ LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_i
     : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
   for (const std::string& id : camera_ids) cameras_[id];
   for (const char* counter :
-       {"imprints", "repeated", "surplus", "refused", "malformed", "missed", "dropped", "results"}) {
+       {"imprints", "repeated", "surplus", "reordered", "refused", "malformed", "missed", "dropped", "results"}) {
     counters_[counter] = 0;
   }
 }
@@ -130,6 +141,22 @@ void LineBoard::note_imprint(const Imprint& imprint, Time now) {
   camera->second.imprint = imprint;
   camera->second.imprint->upper = camera->second.imprint->lower = camera->second.imprint->axis = {};
   camera->second.imprint_at = now;
+}
+
+void LineBoard::set_delivery(const Delivery& delivery, Time now) {
+  const std::lock_guard lock(mutex_);
+  const auto camera = cameras_.find(delivery.camera_id);
+  if (camera == cameras_.end()) return;
+  camera->second.delivery = delivery;
+  camera->second.delivery_at = now;
+}
+
+void LineBoard::set_missing(const std::string& camera_id, std::uint64_t count, const std::string& numbers) {
+  const std::lock_guard lock(mutex_);
+  const auto camera = cameras_.find(camera_id);
+  if (camera == cameras_.end()) return;
+  camera->second.missing = count;
+  camera->second.missing_numbers = numbers;
 }
 
 void LineBoard::set_session(CurrentSession session) {
@@ -191,6 +218,8 @@ json LineBoard::status(Time now) const {
 
 json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {
   json document = {{"id", id}, {"alive", camera.alive}, {"health", nullptr}, {"last_imprint", nullptr}};
+  document["delivery"] = {{"missing", camera.missing}, {"missing_numbers", camera.missing_numbers}, {"node", nullptr}};
+  if (camera.delivery) document["delivery"]["node"] = delivery_json(*camera.delivery, age_s(camera.delivery_at, now));
   if (camera.health) document["health"] = health_json(*camera.health, age_s(camera.health_at, now));
   if (camera.imprint) document["last_imprint"] = imprint_json(*camera.imprint, age_s(camera.imprint_at, now));
   return document;

@@ -50,6 +50,10 @@ class LineBoard {
   /// alarm when this record has raised it, else nothing.
   std::optional<std::string> set_health(const Health& health, Time now);
   void note_imprint(const Imprint& imprint, Time now);
+  /// What a camera's node holds that fusion has not confirmed.
+  void set_delivery(const Delivery& delivery, Time now);
+  /// What fusion misses between the imprints of a camera that it has: how many, and which sequence numbers.
+  void set_missing(const std::string& camera_id, std::uint64_t count, const std::string& numbers);
   void set_session(CurrentSession session);
   void set_result(const StoredResult& result);
   /// Adds to one of the counters of the status document.
@@ -70,6 +74,10 @@ class LineBoard {
     std::optional<Time> shared_at;                // when two nodes were last seen to take turns
     std::optional<Imprint> imprint;               // without its curves
     Time imprint_at;
+    std::optional<Delivery> delivery;
+    Time delivery_at;
+    std::uint64_t missing = 0;
+    std::string missing_numbers;
   };
   std::optional<std::string> watch_for_namesakes(Camera& camera, const Health& health, Time now);
   [[nodiscard]] static nlohmann::json camera_json(const std::string& id, const Camera& camera, Time now);

@@ -5,7 +5,7 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
-#include "fusion/store/store_lock.h"
+#include "lib/config/file_lock.h"
 
 namespace imprint {
 namespace {
@@ -67,7 +67,7 @@ constexpr const char* kSelectResult = "SELECT session, complete, error, json, ma
 
 class SqliteStore final : public SessionStore {
  public:
-  SqliteStore(const std::filesystem::path& path, StoreLock lock)
+  SqliteStore(const std::filesystem::path& path, FileLock lock)
       : path_(path),
         lock_(std::move(lock)),
         db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
@@ -147,6 +147,15 @@ WHERE complete <> excluded.complete OR error <> excluded.error OR json <> exclud
     });
   }
 
+  Result<std::int64_t> revision(const std::string& session) override {
+    return guarded<std::int64_t>([&] {
+      SQLite::Statement select(db_, "SELECT ifnull(max(revision), 0) FROM result WHERE session = ?");
+      select.bind(1, session);
+      select.executeStep();
+      return select.getColumn(0).getInt64();
+    });
+  }
+
   Result<std::optional<StoredResult>> latest_result() override {
     return guarded<std::optional<StoredResult>>([&]() -> std::optional<StoredResult> {
       SQLite::Statement select(db_, std::string(kSelectResult) + "ORDER BY revision DESC LIMIT 1");
@@ -207,6 +216,39 @@ ORDER BY newest)sql");
     });
   }
 
+  Result<std::vector<std::string>> unevaluated() override {
+    return guarded<std::vector<std::string>>([&] {
+      SQLite::Statement select(db_, R"sql(
+SELECT newest.session FROM (SELECT session, max(id) AS id FROM message GROUP BY session) AS newest
+LEFT JOIN result ON result.session = newest.session
+WHERE result.session IS NULL OR newest.id > result.last_message
+ORDER BY newest.id)sql");
+      std::vector<std::string> names;
+      while (select.executeStep()) names.push_back(select.getColumn(0).getString());
+      return names;
+    });
+  }
+
+  Result<std::vector<std::pair<std::uint64_t, std::uint64_t>>> sequences(const std::string& camera_id,
+                                                                         int starts) override {
+    return guarded<std::vector<std::pair<std::uint64_t, std::uint64_t>>>([&] {
+      SQLite::Statement select(db_, R"sql(
+SELECT message.boot_id, message.sequence
+FROM (SELECT boot_id, max(id) AS newest FROM message WHERE camera = ?1 GROUP BY boot_id
+      ORDER BY newest DESC LIMIT ?2) AS start
+JOIN message ON message.camera = ?1 AND message.boot_id = start.boot_id
+ORDER BY start.newest, message.sequence)sql");
+      select.bind(1, camera_id);
+      select.bind(2, starts);
+      std::vector<std::pair<std::uint64_t, std::uint64_t>> numbers;
+      while (select.executeStep()) {
+        numbers.emplace_back(static_cast<std::uint64_t>(select.getColumn(0).getInt64()),
+                             static_cast<std::uint64_t>(select.getColumn(1).getInt64()));
+      }
+      return numbers;
+    });
+  }
+
   Result<std::vector<StoredMessage>> messages(const std::string& session) override {
     return guarded<std::vector<StoredMessage>>([&] {
       SQLite::Statement select(db_,
@@ -245,7 +287,7 @@ ORDER BY newest)sql");
   }
 
   std::filesystem::path path_;
-  StoreLock lock_;
+  FileLock lock_;  // two fusion nodes on one file would each announce results without the other's imprints
   std::mutex mutex_;
   SQLite::Database db_;
 };
@@ -253,7 +295,13 @@ ORDER BY newest)sql");
 }  // namespace
 
 Result<std::unique_ptr<SessionStore>> SessionStore::open(const std::filesystem::path& path) {
-  auto lock = StoreLock::take(path);
+  // Beside the file: SQLite locks the file itself, and loses its locks when another descriptor of it is closed.
+  const std::string lock_path = path.string() + ".lock";
+  auto lock = FileLock::take(
+      lock_path,
+      fmt::format(
+          "{}: in use by another imprint-fusion (it holds {}); stop that one, or name another file as fusion.database",
+          path.string(), lock_path));
   if (!lock) return pass_on(lock.error());
   try {
     auto store = std::make_unique<SqliteStore>(path, std::move(*lock));

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lib/imprint/imprint.h"
@@ -67,11 +68,18 @@ class SessionStore {
 
   virtual Result<std::optional<StoredResult>> result(const std::string& session) = 0;
   virtual Result<std::optional<StoredResult>> latest_result() = 0;
+  /// Of the session's result; 0 when there is none.
+  virtual Result<std::int64_t> revision(const std::string& session) = 0;
   /// Newest first.
   virtual Result<std::vector<SessionSummary>> sessions(int limit) = 0;
   virtual Result<bool> knows(const std::string& session) = 0;
   /// Sessions whose result is not complete or older than their newest imprint; the newest `limit`, oldest first.
   virtual Result<std::vector<std::string>> unfinished(int limit) = 0;
+  /// Sessions with a message that no result has taken in yet, oldest first.
+  virtual Result<std::vector<std::string>> unevaluated() = 0;
+  /// Boot id and sequence of a camera's stored imprints, of its newest `starts` starts; by start, oldest first.
+  virtual Result<std::vector<std::pair<std::uint64_t, std::uint64_t>>> sequences(const std::string& camera_id,
+                                                                                 int starts) = 0;
   /// All messages of a session in the order they were received.
   virtual Result<std::vector<StoredMessage>> messages(const std::string& session) = 0;
 };

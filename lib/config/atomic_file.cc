@@ -51,6 +51,13 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
+// The new name reaches the disk with the folder that holds it. A file system that cannot do that has done its best.
+void sync_folder_of(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const FileDescriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.get() >= 0) (void)::fsync(file.get());
+}
+
 }  // namespace
 
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes) {
@@ -66,6 +73,7 @@ Result<void> write_file_atomically(const std::filesystem::path& path, std::strin
     ::unlink(temporary.c_str());
     return pass_on(write_failure(path, reason));
   }
+  sync_folder_of(path);
   return {};
 }
 

@@ -39,7 +39,8 @@ class Query {
 };
 using QueryCallback = std::function<void(std::shared_ptr<Query>)>;
 
-enum class Traffic { imprint, health, command, bulk };  ///< each has its own priority on the link
+/// Each has its own priority on the link; `backlog`: imprints sent again.
+enum class Traffic { imprint, backlog, health, command, bulk };
 
 /// Sends on one key. With `history` the last samples are kept for subscribers that come late or lost some.
 class Publisher {

@@ -47,6 +47,9 @@ bridge::PublisherSetup setup_of(const PublisherOptions& options) {
       setup.priority = 4;  // data, high
       setup.express = true;
       break;
+    case Traffic::backlog:
+      setup.priority = 5;  // data: what is measured now goes first
+      break;
     case Traffic::health:
       setup.priority = 6;  // data, low
       break;

@@ -53,6 +53,32 @@ struct Health {
 std::vector<std::uint8_t> encode_health(const Health& health);
 Result<Health> decode_health(std::span<const std::uint8_t> bytes);
 
+/// From fusion to a node: this imprint is on fusion's disk, or can never be.
+struct Receipt {
+  std::string camera_id;
+  std::uint64_t boot_id = 0;
+  std::uint64_t sequence = 0;
+  std::string refused;  ///< why it can never be stored, cut to 240 bytes; empty: it is stored
+};
+std::vector<std::uint8_t> encode_receipt(const Receipt& receipt);
+Result<Receipt> decode_receipt(std::span<const std::uint8_t> bytes);
+
+/// What a node still holds for fusion.
+struct Delivery {
+  std::string camera_id;
+  std::int64_t time_ns = 0;
+  std::uint64_t boot_id = 0;
+  std::uint64_t sequence = 0;        ///< of the last imprint made since this start
+  std::uint64_t oldest_waiting = 0;  ///< lowest sequence of this start without a receipt; 0: none
+  std::uint32_t waiting = 0;         ///< imprints without a receipt, of all starts
+  std::uint64_t waiting_bytes = 0;
+  std::uint64_t discarded = 0;  ///< since this start, for want of room, before fusion had them
+  std::uint64_t refused = 0;    ///< since this start, by fusion
+  std::string fault;            ///< why imprints cannot be kept on disk, cut to 240 bytes; empty: they are
+};
+std::vector<std::uint8_t> encode_delivery(const Delivery& delivery);
+Result<Delivery> decode_delivery(std::span<const std::uint8_t> bytes);
+
 /// A `Result` message: the JSON document of `imprint.result/1` with its session and whether it is the last.
 struct ResultMessage {
   std::string session;

@@ -1,9 +1,5 @@
-"""The running line: real processes over Zenoh on loopback, fed with a small rendered session.
-
-Meson passes the programs and the scene in the environment: IMPRINT, IMPRINT_NODE, IMPRINT_FUSION, IMPRINT_SCENE.
-"""
+"""The running line, fed with a small rendered session."""
 import json
-import os
 import pathlib
 import shutil
 import signal
@@ -16,9 +12,9 @@ import unittest
 import urllib.error
 import urllib.request
 
-IMPRINT, NODE, FUSION, SCENE = (os.environ[name] for name in ("IMPRINT", "IMPRINT_NODE", "IMPRINT_FUSION", "IMPRINT_SCENE"))
-SANITIZED_FACTOR = float(os.environ.get("IMPRINT_TEST_PATIENCE", "1"))  # sanitizer builds are slower
-PATIENCE_S = 60 * SANITIZED_FACTOR  # a busy machine may take long; nothing here waits for it when all is well
+import running_line
+from running_line import FUSION, IMPRINT, NODE, PATIENCE_S, SANITIZED_FACTOR, SCENE, free_port, imprint
+
 SAME_MM = 0.01  # what the distributed run may differ from `imprint measure`: the rounding of curves on the wire
 
 work = data = reference = rotations = None
@@ -36,121 +32,14 @@ def setUpModule():
         rotations = [observation["rotation_deg"] for observation in tomllib.load(file)["observation"]]
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def imprint(*arguments):
-    return subprocess.run([IMPRINT, *map(str, arguments)], capture_output=True, text=True, timeout=2 * PATIENCE_S, check=False)
-
-
-class Line:
-    """Processes of one line in a folder of their own; all are gone when the block is left."""
+class Line(running_line.Line):
+    """A line that looks at the rendered session, or at other `images`."""
 
     def __init__(self, deadline_s=PATIENCE_S, images=None):
-        self.folder = pathlib.Path(tempfile.mkdtemp(dir=work))
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self.page = free_port()
-        self.processes = {}
-        self.fusion_config = self.write("fusion.toml", f"""
-[fusion]
-rig = "{data / 'rig.toml'}"
-database = "imprint.db"
-result_dir = "results"
-deadline_s = {deadline_s}
-[zenoh]
-listen = ["{self.endpoint}"]
-[page]
-port = {self.page}
-""")
-        self.node_config = self.write("node.toml", f"""
-[node]
-camera_id = "cam1"
-rig = "{data / 'rig.toml'}"
-[capture]
-source = "folder"
-path = "{images or data}"
-[zenoh]
-connect = ["{self.endpoint}"]
-[health]
-period_s = 0.5
-""")
-
-    def write(self, name, text):
-        (self.folder / name).write_text(text, encoding="utf-8")
-        return self.folder / name
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        for process in self.processes.values():
-            process.kill()
-        for process in self.processes.values():
-            process.wait()
-            if process.stdout:
-                process.stdout.close()
-
-    def start(self, name, command, environment=None):
-        with open(self.folder / f"{name}.log", "ab") as log:
-            self.processes[name] = subprocess.Popen([str(part) for part in command], stdout=log, stderr=log,
-                                                    env={**os.environ, **(environment or {})})
-
-    def start_fusion(self, **environment):
-        self.start("fusion", [FUSION, "--config", self.fusion_config], environment)
-
-    def start_nodes(self, *cameras, **settings):
-        for camera in cameras:
-            command = [NODE, "--config", self.node_config, "--set", f"node.camera_id={camera}"]
-            for key, value in settings.items():
-                command += ["--set", f"{key.replace('__', '.')}={value}"]
-            self.start(camera, command)
-
-    def end(self, name, with_signal):
-        """Ends a process and gives its exit status and how long that took."""
-        begin = time.monotonic()
-        self.processes[name].send_signal(with_signal)
-        return self.processes.pop(name).wait(PATIENCE_S), time.monotonic() - begin
-
-    def status(self):
-        done = imprint("status", "--connect", self.endpoint, "--timeout", PATIENCE_S, "--json")
-        return json.loads(done.stdout) if done.returncode == 0 else None
-
-    def wait_for(self, condition, what):
-        until = time.monotonic() + PATIENCE_S
-        while time.monotonic() < until:
-            status = self.status()
-            if status and condition(status):
-                return status
-            time.sleep(0.1)
-        raise AssertionError(f"not within {PATIENCE_S} s: {what}\n{self.logs()}")
-
-    def wait_alive(self, *cameras):
-        return self.wait_for(lambda status: {c["id"] for c in status["cameras"] if c["alive"]} == set(cameras),
-                             f"cameras {cameras} alive")
+        super().__init__(work, data / "rig.toml", "folder", images or data, deadline_s)
 
     def trigger(self, observation, expect, wait=True, session="S"):
-        arguments = ["trigger", "--connect", self.endpoint, "--session", session, "--observation", observation,
-                     f"--rotation-deg={rotations[observation]}", "--expect", expect, "--json"]
-        done = imprint(*arguments, *(["--wait", PATIENCE_S] if wait else []))
-        if done.returncode != 0:
-            raise AssertionError(f"trigger: {done.stderr}\n{self.logs()}")
-        return json.loads(done.stdout)
-
-    def watch(self, *arguments):
-        watch = subprocess.Popen([IMPRINT, "watch", "--connect", self.endpoint, "--json", *map(str, arguments)],
-                                 stdout=subprocess.PIPE)
-        self.processes[f"watch {len(self.processes)}"] = watch
-        return watch
-
-    def result(self, session="S"):
-        with urllib.request.urlopen(f"http://127.0.0.1:{self.page}/api/result/{session}", timeout=10) as answer:
-            return json.load(answer)
-
-    def logs(self):
-        return "\n".join(f"--- {log.name}\n{log.read_text(errors='replace')}" for log in sorted(self.folder.glob("*.log")))
+        return super().trigger(observation, expect, wait, session, rotations[observation])
 
 
 class LiveLineTest(unittest.TestCase):

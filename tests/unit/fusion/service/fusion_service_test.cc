@@ -255,6 +255,99 @@ TEST_CASE("fusion: what is malformed, too large, of a foreign camera or under a 
   REQUIRE(plant.store->messages("S")->size() == 1);
 }
 
+TEST_CASE("fusion: a node hears of every imprint that is on disk, again when it sends it again, and of one refused") {
+  Plant plant;
+  std::mutex mutex;
+  std::vector<Receipt> receipts;
+  const auto heard = plant.outside->subscribe(plant.keys.receipt("cam1"), {}, [&](const Sample& sample) {
+    const std::lock_guard lock(mutex);
+    receipts.push_back(*decode_receipt(sample.payload));
+  });
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam1", 9999, 2);  // beyond what a session can have
+  REQUIRE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return receipts.size() == 3;
+  }));
+  const std::lock_guard lock(mutex);
+  for (int i : {0, 1}) {
+    REQUIRE(receipts[i].boot_id == 5);
+    REQUIRE(receipts[i].sequence == 1);
+    REQUIRE(receipts[i].refused.empty());
+  }
+  REQUIRE(receipts[2].sequence == 2);
+  REQUIRE(receipts[2].refused == "a session has at most 64 observations");
+  REQUIRE(plant.store->messages("S")->size() == 1);
+}
+
+TEST_CASE("fusion: a gap is named until it is filled, also after a restart, and so is what a node says it holds") {
+  Plant plant;
+  const auto delivery = [&] { return plant.status()["cameras"][0]["delivery"]; };
+  plant.answer("cam1", 0, 1);
+  plant.answer("cam1", 3, 4);
+  REQUIRE(eventually([&] { return delivery()["missing_numbers"] == "2-3"; }));
+  plant.stop();
+  plant.start();
+  REQUIRE(delivery()["missing_numbers"] == "2-3");
+  plant.answer("cam1", 1, 2);
+  plant.answer("cam1", 2, 3);
+  REQUIRE(eventually([&] { return delivery()["missing"] == 0; }));
+  REQUIRE(plant.counted("reordered") == 2);
+
+  const auto reports = plant.outside->publish(plant.keys.delivery("cam1"), {.traffic = Traffic::health});
+  Delivery report{.camera_id = "cam1", .boot_id = 5, .sequence = 6, .oldest_waiting = 5, .waiting = 2};
+  report.discarded = 3;
+  REQUIRE((*reports)->put(encode_delivery(report)));
+  REQUIRE(eventually([&] { return delivery()["node"].is_object(); }));
+  REQUIRE(delivery()["node"]["waiting"] == 2);
+  REQUIRE(delivery()["missing_numbers"] == "5-6");
+  REQUIRE(plant.status()["alarms"][0]["name"] == "discarded_cam1");
+}
+
+TEST_CASE("fusion: more sessions than are held at a time, camera by camera: each has its result, whole and once") {
+  Plant plant;
+  constexpr std::uint64_t kSessions = 40;  // 16 are held
+  for (std::uint64_t i = 0; i < kSessions; ++i) plant.trigger(0, 1, fmt::format("S{}", i));
+  for (const char* camera : {"cam1", "cam2", "cam3"}) {
+    for (std::uint64_t i = 0; i < kSessions; ++i) plant.answer(camera, 0, i + 1, fmt::format("S{}", i));
+  }
+  REQUIRE(eventually([&] { return plant.result_count() >= kSessions; }));
+  std::this_thread::sleep_for(100ms);
+  REQUIRE(plant.result_count() == kSessions);
+  for (std::uint64_t i = 0; i < kSessions; ++i) {
+    const auto result = plant.store->result(fmt::format("S{}", i));
+    REQUIRE(result->value().complete);
+    REQUIRE(nlohmann::json::parse(result->value().json)["length_mm"] == 3.0);
+  }
+}
+
+TEST_CASE("fusion: sessions that had to leave unfinished are evaluated when their time is up") {
+  Plant plant(0.5);
+  constexpr std::uint64_t kSessions = 40;
+  for (std::uint64_t i = 0; i < kSessions; ++i) plant.answer("cam1", 0, i + 1, fmt::format("S{}", i));
+  REQUIRE(eventually([&] { return plant.store->unevaluated()->empty() && plant.counted("imprints") == kSessions; }));
+  REQUIRE(plant.store->sessions(100)->size() == kSessions);
+}
+
+TEST_CASE("fusion: taken up again, a result that comes out the same is neither stored nor announced once more") {
+  Plant plant;
+  plant.trigger(0, 2);
+  for (const char* camera : {"cam1", "cam2", "cam3"}) plant.answer(camera, 0, 1);
+  REQUIRE(eventually([&] { return plant.result_count() == 1; }));
+  const std::string before = plant.store->result("S")->value().json;
+  plant.stop();
+  std::filesystem::remove_all(plant.folder / "results");
+  plant.start();
+  REQUIRE(eventually([&] { return plant.status()["session"].is_object(); }));
+  plant.trigger(1, 2);  // comes after what was taken up
+  REQUIRE(eventually([&] { return plant.counted("dropped") == 0 && plant.store->messages("S")->size() == 5; }));
+  REQUIRE(plant.store->result("S")->value().revision == 1);
+  REQUIRE(plant.store->result("S")->value().json == before);
+  REQUIRE(plant.result_count() == 1);
+  REQUIRE(std::filesystem::exists(plant.folder / "results/S/result.json"));  // as if killed before it was written
+}
+
 TEST_CASE("fusion: its turns are counted while it is idle and while it works, not while a fusion hangs") {
   Plant plant(0.2);
   const auto turned_since = [&](std::uint64_t turns) {

@@ -56,7 +56,7 @@ bool wait_for_text(const Gathered<std::string>& texts, const std::string& wanted
 }  // namespace
 
 TEMPLATE_TEST_CASE("transport: samples arrive in the order they were put", "", BOTH_TRANSPORTS) {
-  const auto traffic = GENERATE(Traffic::imprint, Traffic::health, Traffic::command, Traffic::bulk);
+  const auto traffic = GENERATE(Traffic::imprint, Traffic::backlog, Traffic::health, Traffic::command, Traffic::bulk);
   Gathered<std::string> texts;
   TestType plant;
   const auto fusion = plant.fusion();

@@ -68,6 +68,31 @@ TEST_CASE("health message: a long error is cut to 80 bytes") {
   CHECK(got->last_error == std::string(77, 'e') + "...");
 }
 
+TEST_CASE("receipt and delivery messages: come back whole, long reasons cut") {
+  const Receipt receipt{"cam1", 0xFEDCBA9876543210, 12, std::string(300, 'r')};
+  const auto confirmed = decode_receipt(encode_receipt(receipt));
+  REQUIRE(confirmed);
+  CHECK(confirmed->camera_id == "cam1");
+  CHECK(confirmed->boot_id == receipt.boot_id);
+  CHECK(confirmed->sequence == 12);
+  CHECK(confirmed->refused == std::string(237, 'r') + "...");
+  CHECK(encode_receipt({"cam1", ~0ULL, 1'000'000, ""}).size() < 32);  // one an imprint
+
+  const auto told = decode_delivery(encode_delivery({"cam1", -5, 7, 12, 9, 3, 12'288, 1, 2, "no space left"}));
+  REQUIRE(told);
+  CHECK(told->time_ns == -5);
+  CHECK(told->boot_id == 7);
+  CHECK(told->sequence == 12);
+  CHECK(told->oldest_waiting == 9);
+  CHECK(told->waiting == 3);
+  CHECK(told->waiting_bytes == 12'288);
+  CHECK(told->discarded == 1);
+  CHECK(told->refused == 2);
+  CHECK(told->fault == "no space left");
+  CHECK_FALSE(decode_receipt(std::vector<std::uint8_t>{0x10}));
+  CHECK_FALSE(decode_delivery(encode_delivery({"no id", 0, 0, 0, 0, 0, 0, 0, 0, ""})));
+}
+
 TEST_CASE("result message: comes back whole") {
   const ResultMessage sent{"heat-0417", true, "", R"({"schema": "imprint.result/1", "warnings": ["čidlo"]})"};
   const auto got = decode_result(encode_result(sent));

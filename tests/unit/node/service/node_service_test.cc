@@ -6,6 +6,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/unit/temporary_folder.h"
+
 namespace imprint {
 namespace {
 
@@ -126,6 +128,28 @@ TEST_CASE("node: a trigger that was answered well is not answered again, one tha
   REQUIRE(imprints[2].failure.empty());
   REQUIRE(imprints[2].sequence == 3);
   REQUIRE(line.source.captures == 3);
+}
+
+TEST_CASE("node: what was answered before a restart and still waits for fusion is sent, not taken again") {
+  const TemporaryFolder folder;
+  Line line;
+  NodeConfig settings = config();
+  settings.data_dir = folder.path();
+  {
+    NodeService node(settings, line.source, seen, *line.node_side);
+    REQUIRE(node.start());
+    line.fire(0);
+    REQUIRE(line.wait_for_imprints(1).size() == 1);
+  }
+  NodeService node(settings, line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  line.fire(0);
+  line.fire(1);
+  const auto imprints = line.wait_for_imprints(2);
+  REQUIRE(imprints.back().observation == 1);
+  REQUIRE(line.source.captures == 2);
+  const auto fusion = line.fusion_side->announce(line.keys.fusion_alive());
+  REQUIRE(line.wait_for_imprints(3).size() >= 3);  // fusion has come: the first is sent again
 }
 
 TEST_CASE("node: an exception of a stage fails the frame, not the node") {
