@@ -57,6 +57,8 @@ void print_camera(const json& camera) {
     if (const auto error = health["last_error"].get<std::string>(); !error.empty())
       std::cout << "; last error: " << error;
   }
+  if (const json& clock = camera["clock"]; clock.is_object())
+    std::cout << fmt::format("; clock {:+.3f} s", clock["offset_s"].get<double>());
   if (const json& delivery = camera["delivery"]; delivery.is_object()) {
     if (delivery["missing"] != 0)
       std::cout << "; MISSING imprint(s) number " << delivery["missing_numbers"].get<std::string>();
@@ -264,7 +266,9 @@ Result<void> send(const LineLink& link, Publisher& publisher, const Trigger& tri
     for (const auto again = steady_clock::now() + std::chrono::seconds(1); steady_clock::now() < again;) {
       const auto status = link.ask("status", "", kAskTimeout);
       if (!status) return pass_on(status.error());
-      if (!observation_state(*status, trigger).is_null()) return {};
+      // Its imprints may be there before the trigger itself, which may have been lost on the way to fusion.
+      const json state = observation_state(*status, trigger);
+      if (state.is_object() && state.value("triggered", true)) return {};
       std::this_thread::sleep_for(milliseconds(20));
     }
   }

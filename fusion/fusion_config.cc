@@ -19,14 +19,16 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   FusionConfig config;
   TomlReader read(path, table);
   read.only({"fusion.site", "fusion.line", "fusion.rig", "fusion.database", "fusion.result_dir", "fusion.deadline_s",
-             "fusion.method", "fusion.geometry", "fusion.log_level", "zenoh.connect", "zenoh.listen", "page.address",
-             "page.port"});
+             "fusion.max_spread_s", "fusion.max_clock_offset_s", "fusion.method", "fusion.geometry", "fusion.log_level",
+             "zenoh.connect", "zenoh.listen", "page.address", "page.port"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
   config.database = read.path("fusion.database", std::filesystem::absolute(path).parent_path() / config.database);
   config.result_dir = read.path("fusion.result_dir", config.result_dir);
   config.assembler.deadline_s = read.number("fusion.deadline_s", config.assembler.deadline_s);
+  config.assembler.max_spread_s = read.number("fusion.max_spread_s", config.assembler.max_spread_s);
+  config.assembler.max_clock_offset_s = read.number("fusion.max_clock_offset_s", config.assembler.max_clock_offset_s);
   config.method = read_choice(read, "fusion.method", kMethods, config.method);
   config.geometry =
       geometry_method_of(read_choice(read, "fusion.geometry", kGeometryMethods, std::string(name_of(config.geometry))));
@@ -37,7 +39,8 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   if (port < 0 || port > 65535) read.fault("page.port", fmt::format("expected 0 to 65535, found {}", port));
   config.page.port = static_cast<int>(std::clamp<std::int64_t>(port, 0, 65535));
   if (const auto valid = config.assembler.validate(); !valid) {
-    read.fault("fusion.deadline_s", without_key(valid.error().message));
+    const std::string& message = valid.error().message;
+    read.fault("fusion." + message.substr(0, message.find(':')), without_key(message));
   }
   if (const auto valid = config.page.validate(); !valid) read.fault("page.address", without_key(valid.error().message));
   if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
@@ -49,13 +52,14 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
 
 std::string to_toml(const FusionConfig& config) {
   return fmt::format(
-      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmethod = {}\ngeometry = "
-      "{}\nlog_level = {}\n\n"
+      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmax_spread_s = {}\n"
+      "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n"
       "[zenoh]\nlisten = {}\nconnect = {}\n\n[page]\naddress = {}\nport = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
-      toml_number(config.assembler.deadline_s), toml_text(config.method), toml_text(name_of(config.geometry)),
+      toml_number(config.assembler.deadline_s), toml_number(config.assembler.max_spread_s),
+      toml_number(config.assembler.max_clock_offset_s), toml_text(config.method), toml_text(name_of(config.geometry)),
       toml_text(config.log_level), toml_list(config.zenoh.listen), toml_list(config.zenoh.connect),
       toml_text(config.page.address), config.page.port);
 }

@@ -49,6 +49,7 @@ Result<void> FusionService::start() {
   if (!desk) return pass_on(desk.error());
   desk_.emplace(std::move(*desk));
   announcer_.emplace(transport_, *keys_, config_.result_dir, board_);
+  clocks_.emplace(transport_, *keys_, board_, config_.assembler.max_clock_offset_s);
   if (const auto latest = store_.latest_result(); latest && latest->has_value()) board_.set_result(**latest);
   if (auto subscribed = subscribe(); !subscribed) {
     declarations_.clear();
@@ -109,6 +110,7 @@ void FusionService::stop() {
   queries_->drop();
   if (worker_.joinable()) worker_.join();
   if (answerer_.joinable()) answerer_.join();
+  clocks_.reset();
 }
 
 void FusionService::work() {
@@ -202,24 +204,28 @@ void FusionService::receive_imprint(const Message& message) {
     if (known) desk_->refused(*imprint, why);  // a camera may still be added to the rig: its node keeps what it has
     return;
   }
+  if (!assembler_.knows(imprint->session)) recall(imprint->session);
+  const Time now = std::chrono::steady_clock::now();
+  Circumstances circumstances{.late = assembler_.is_late(*imprint, now)};
+  if (const auto offset = clocks_->offset(imprint->camera_id)) circumstances.clock_offset_ns = offset->offset_ns;
   bool is_new = false;
-  if (!surely<bool>([&] { return store_.add_imprint(*imprint, message.bytes, wall_clock_ns()); }, is_new)) return;
+  if (!surely<bool>(
+          [&] {
+            return store_.add_imprint(*imprint, message.bytes,
+                                      {wall_clock_ns(), circumstances.late, circumstances.clock_offset_ns});
+          },
+          is_new))
+    return;
   board_.count(is_new ? "imprints" : "repeated");
   desk_->stored(*imprint, is_new);
   if (!is_new) return;
-  const Time now = std::chrono::steady_clock::now();
+  if (circumstances.late) board_.count("late");
   board_.note_imprint(*imprint, now);
-  if (assembler_.knows(imprint->session)) {
-    const Arrival arrival = assembler_.add(*imprint, now);
-    if (arrival == Arrival::surplus) board_.count("surplus");
-    spdlog::info("session {} observation {}: imprint of {} {}{}", imprint->session, imprint->observation,
-                 imprint->camera_id, arrival_name(arrival),
-                 imprint->failure.empty() ? "" : "; it failed: " + imprint->failure);
-  } else {
-    spdlog::info("session {} observation {}: imprint of {}", imprint->session, imprint->observation,
-                 imprint->camera_id);
-    recall(imprint->session);
-  }
+  const Arrival arrival = assembler_.add(*imprint, now, circumstances);
+  if (arrival == Arrival::surplus) board_.count("surplus");
+  spdlog::info("session {} observation {}: imprint of {} {}{}{}", imprint->session, imprint->observation,
+               imprint->camera_id, arrival_name(arrival), circumstances.late ? ", late" : "",
+               imprint->failure.empty() ? "" : "; it failed: " + imprint->failure);
   show_session(imprint->session);
 }
 
@@ -248,6 +254,7 @@ void FusionService::receive_liveness(const std::string& camera_id, bool alive) {
   }
   spdlog::info("camera {}: {}", camera_id, alive ? "connected" : "connection lost");
   assembler_.set_alive(camera_id, alive);
+  clocks_->set_alive(camera_id, alive);
   board_.set_alive(camera_id, alive);
   if (!alive) return;
   for (Trigger trigger : assembler_.open_triggers(camera_id)) {
@@ -270,12 +277,12 @@ void FusionService::recall(const std::string& session) {
   // Older than the deadline is as good as the deadline; a clock that was set back makes nothing younger than now.
   const auto oldest_ns = static_cast<std::int64_t>(config_.assembler.deadline_s * 1e9);
   for (const StoredMessage& message : *messages) {
-    const std::int64_t age_ns = std::clamp<std::int64_t>(wall_now_ns - message.received_ns, 0, oldest_ns);
+    const std::int64_t age_ns = std::clamp<std::int64_t>(wall_now_ns - message.reception.received_ns, 0, oldest_ns);
     const Time then = now - std::chrono::duration_cast<Time::duration>(std::chrono::nanoseconds(age_ns));
     if (message.is_trigger) {
       if (const auto trigger = decode_trigger(message.bytes)) (void)assembler_.add(*trigger, then);
     } else if (const auto imprint = decode_imprint(message.bytes)) {
-      assembler_.add(*imprint, then);
+      assembler_.add(*imprint, then, {message.reception.late, message.reception.clock_offset_ns});
     }
   }
 }

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "fusion/clock_watch.h"
 #include "fusion/delivery_desk.h"
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_pipeline.h"
@@ -92,6 +93,7 @@ class FusionService {
   std::shared_ptr<Keys> keys_;
   std::optional<DeliveryDesk> desk_;
   std::optional<ResultAnnouncer> announcer_;
+  std::optional<ClockWatch> clocks_;
   std::deque<std::string> backlog_;  // sessions whose result may be due, but whose imprints are only in the store
   std::shared_ptr<BoundedQueue<Message>> queue_;
   std::shared_ptr<BoundedQueue<Message>> liveness_;  // of their own, so that a flood of messages cannot hide them

@@ -56,6 +56,9 @@ Result<void> NodeService::start() {
     if (answered_.size() >= kRememberedAnswers) answered_.pop_front();
     answered_.push_back(std::move(answer));
   }
+  auto clock = ClockAnswer::start(transport_, *keys, config_.camera_id);
+  if (!clock) return pass_on(clock.error());
+  clock_ = std::move(*clock);
   auto health = transport_.publish(keys->health(config_.camera_id), {.traffic = Traffic::health, .history = 0});
   if (!health) return pass_on(health.error());
   health_publisher_ = std::move(*health);
@@ -125,7 +128,7 @@ void NodeService::receive(const Bytes& message) {
 }
 
 bool NodeService::await(const Trigger& trigger, std::vector<std::string>& warnings) {
-  const auto lead = std::chrono::nanoseconds(trigger.fire_at_ns - wall_clock_ns());
+  const auto lead = std::chrono::nanoseconds(trigger.fire_at_ns - (wall_clock_ns() - clock_->offset_ns()));
   std::unique_lock lock(stop_mutex_);
   if (trigger.fire_at_ns == 0 || lead <= std::chrono::nanoseconds(0)) return !stopping_;
   if (lead > kMaxLead) {

@@ -19,6 +19,7 @@
 #include "node/capture/frame_source.h"
 #include "node/node_config.h"
 #include "node/node_pipeline.h"
+#include "node/publish/clock_answer.h"
 #include "node/publish/imprint_courier.h"
 
 namespace imprint {
@@ -53,7 +54,7 @@ class NodeService {
  private:
   void work();
   void receive(const Bytes& message);
-  /// Waits for the trigger's moment; false when the node is stopped meanwhile.
+  /// Waits for the trigger's moment, which is by fusion's clock; false when the node is stopped meanwhile.
   bool await(const Trigger& trigger, std::vector<std::string>& warnings);
   Imprint make_imprint(const Trigger& trigger);
   void note(const Imprint& imprint);
@@ -66,6 +67,7 @@ class NodeService {
   std::deque<std::pair<std::string, std::uint32_t>> answered_;  // session, observation; the oldest first
 
   std::unique_ptr<ImprintCourier> courier_;
+  std::unique_ptr<ClockAnswer> clock_;
   std::mutex health_mutex_;  // guards the health record and its publisher
   std::unique_ptr<Publisher> health_publisher_;
   Health health_;

@@ -25,6 +25,12 @@ Result<void> AssemblerConfig::validate() const {
   if (!(deadline_s > 0.0 && deadline_s <= 3600.0)) {
     return invalid_input("deadline_s: expected more than 0 and at most 3600, found {}", deadline_s);
   }
+  if (!(max_spread_s > 0.0 && max_spread_s <= 3600.0)) {
+    return invalid_input("max_spread_s: expected more than 0 and at most 3600, found {}", max_spread_s);
+  }
+  if (!(max_clock_offset_s > 0.0 && max_clock_offset_s <= 3600.0)) {
+    return invalid_input("max_clock_offset_s: expected more than 0 and at most 3600, found {}", max_clock_offset_s);
+  }
   if (max_sessions < 1) return invalid_input("max_sessions: expected at least 1, found 0");
   if (max_observations < 1) return invalid_input("max_observations: expected at least 1, found 0");
   return {};
@@ -88,7 +94,7 @@ Result<void> ObservationAssembler::add(const Trigger& trigger, Time now) {
   return {};
 }
 
-Arrival ObservationAssembler::add(const Imprint& imprint, Time now) {
+Arrival ObservationAssembler::add(const Imprint& imprint, Time now, const Circumstances& circumstances) {
   if (std::ranges::find(camera_ids_, imprint.camera_id) == camera_ids_.end()) return Arrival::unknown_camera;
   if (imprint.observation >= config_.max_observations) return Arrival::refused;
   Session& session = open_session(imprint.session, now);
@@ -101,6 +107,7 @@ Arrival ObservationAssembler::add(const Imprint& imprint, Time now) {
   const auto held = observation.imprints.find(imprint.camera_id);
   if (held == observation.imprints.end()) {
     observation.imprints.emplace(imprint.camera_id, imprint);
+    observation.circumstances[imprint.camera_id] = circumstances;
     observation.why_missing.erase(imprint.camera_id);
     session.due = session.due || observation.settled;
     return Arrival::taken;
@@ -114,8 +121,18 @@ Arrival ObservationAssembler::add(const Imprint& imprint, Time now) {
     return Arrival::surplus;
   }
   held->second = imprint;
+  observation.circumstances[imprint.camera_id] = circumstances;
   session.due = session.due || observation.settled;
   return Arrival::replaced;
+}
+
+bool ObservationAssembler::is_late(const Imprint& imprint, Time now) const {
+  const Session* session = find(imprint.session);
+  if (session == nullptr) return false;
+  const auto entry = session->observations.find(imprint.observation);
+  if (entry == session->observations.end()) return false;
+  const Pending& observation = entry->second;
+  return !observation.imprints.contains(imprint.camera_id) && (observation.settled || now >= observation.deadline);
 }
 
 void ObservationAssembler::set_alive(const std::string& camera_id, bool alive) {
@@ -196,8 +213,41 @@ std::vector<std::string> ObservationAssembler::warnings(const std::string& name)
       warnings.push_back(fmt::format("observation {}: no trigger was received; rotation {} deg is the imprints'", index,
                                      observation.rotation_deg));
     }
+    if (observation.settled) warn_of_times(index, observation, warnings);
   }
   return warnings;
+}
+
+void ObservationAssembler::warn_of_times(std::uint32_t index, const Pending& observation,
+                                         std::vector<std::string>& warnings) const {
+  std::vector<std::pair<double, std::string>> taken;  // s by fusion's clock since the first camera's, camera
+  std::int64_t first_ns = 0;
+  for (const std::string& camera : camera_ids_) {
+    const auto held = observation.imprints.find(camera);
+    if (held == observation.imprints.end()) continue;
+    const Circumstances& circumstances = observation.circumstances.at(camera);
+    if (circumstances.late) {
+      warnings.push_back(
+          fmt::format("observation {}: the imprint of {} came late, the result was made anew with it", index, camera));
+    }
+    if (!circumstances.clock_offset_ns) continue;
+    const double offset_s = 1e-9 * static_cast<double>(*circumstances.clock_offset_ns);
+    if (std::abs(offset_s) > config_.max_clock_offset_s) {
+      warnings.push_back(
+          fmt::format("observation {}: the clock of {} was {:.1f} s {} fusion's; its times were corrected", index,
+                      camera, std::abs(offset_s), offset_s > 0 ? "ahead of" : "behind"));
+    }
+    const std::int64_t taken_ns = held->second.sensor_time_ns - *circumstances.clock_offset_ns;
+    if (taken.empty()) first_ns = taken_ns;
+    taken.emplace_back(1e-9 * static_cast<double>(taken_ns - first_ns), camera);
+  }
+  if (taken.empty()) return;
+  const auto [earliest, latest] = std::ranges::minmax(taken);
+  if (latest.first - earliest.first > config_.max_spread_s) {
+    warnings.push_back(
+        fmt::format("observation {}: {} took its frame {:.1f} s after {}; the forging must have stood still", index,
+                    latest.second, latest.first - earliest.first, earliest.second));
+  }
 }
 
 std::uint32_t ObservationAssembler::expected(const std::string& name) const {
@@ -210,8 +260,8 @@ std::vector<ObservationState> ObservationAssembler::states(const std::string& na
   const Session* session = find(name);
   if (session == nullptr) return states;
   for (const auto& [index, observation] : session->observations) {
-    ObservationState state{
-        static_cast<int>(index), observation.rotation_deg, observation.settled, {}, waiting_for(observation)};
+    ObservationState state{static_cast<int>(index),  observation.rotation_deg,       observation.settled, {},
+                           waiting_for(observation), observation.trigger.has_value()};
     for (const auto& [camera, imprint] : observation.imprints) state.reported.push_back(camera);
     states.push_back(std::move(state));
   }

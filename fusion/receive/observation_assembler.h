@@ -20,8 +20,16 @@ struct AssemblerConfig {
   double deadline_s = 10.0;       // from the first sign of an observation to its evaluation without the rest; ours
   std::size_t max_sessions = 16;  // sessions held in memory; a settled one longest untouched leaves first; ours
   std::uint32_t max_observations = 64;  // of one session; ours
+  double max_spread_s = 1.0;            // between the frames of one observation; further apart is a warning; ours
+  double max_clock_offset_s = 1.0;      // of a node's clock from fusion's; more is a warning and an alarm; ours
 
   [[nodiscard]] Result<void> validate() const;
+};
+
+/// What an imprint does not say itself.
+struct Circumstances {
+  bool late = false;                              ///< its observation had been evaluated without it
+  std::optional<std::int64_t> clock_offset_ns{};  ///< its node's clock minus fusion's, where it was known
 };
 
 /// What became of an imprint.
@@ -42,6 +50,7 @@ struct ObservationState {
   bool settled = false;               ///< evaluated: every camera has reported or the deadline has passed
   std::vector<std::string> reported;  ///< cameras with an imprint, good or failed
   std::vector<std::string> waiting;   ///< cameras without one
+  bool triggered = false;             ///< its trigger is here; else it is known by its imprints alone
 };
 
 /// Groups imprints by session and observation. Knows no clock: `now` comes from outside and never goes back.
@@ -64,7 +73,9 @@ class ObservationAssembler {
   /// Fails (invalid_input) on an observation beyond `max_observations`. A repeated trigger changes nothing but an
   /// unknown number of expected observations.
   Result<void> add(const Trigger& trigger, Time now);
-  Arrival add(const Imprint& imprint, Time now);
+  Arrival add(const Imprint& imprint, Time now, const Circumstances& circumstances = {});
+  /// Whether the imprint comes when its observation has been, or is to be, evaluated without its camera.
+  [[nodiscard]] bool is_late(const Imprint& imprint, Time now) const;
   /// Whether a camera is connected; only for the words of `Observation::missing`.
   void set_alive(const std::string& camera_id, bool alive);
 
@@ -77,7 +88,8 @@ class ObservationAssembler {
   /// The settled observations, by index.
   [[nodiscard]] std::vector<Observation> observations(const std::string& session) const;
   [[nodiscard]] bool complete(const std::string& session) const;
-  /// What the receiving noticed: repeated answers, contradicting rotations, a missing trigger.
+  /// What the receiving noticed: repeated answers, contradicting rotations, a missing trigger, imprints that came late,
+  /// clocks that are off, frames that were not taken at the same time.
   [[nodiscard]] std::vector<std::string> warnings(const std::string& session) const;
   [[nodiscard]] std::uint32_t expected(const std::string& session) const;
   [[nodiscard]] std::vector<ObservationState> states(const std::string& session) const;
@@ -96,6 +108,7 @@ class ObservationAssembler {
     double rotation_deg = 0.0;
     Time deadline;
     std::map<std::string, Imprint> imprints;  // by camera
+    std::map<std::string, Circumstances> circumstances;
     bool settled = false;
     std::map<std::string, std::string> why_missing;  // frozen when it settled
   };
@@ -112,6 +125,7 @@ class ObservationAssembler {
   Pending& open_observation(Session& session, std::uint32_t index, double rotation_deg, Time now);
   [[nodiscard]] const Session* find(const std::string& session) const;
   [[nodiscard]] std::vector<std::string> waiting_for(const Pending& observation) const;
+  void warn_of_times(std::uint32_t index, const Pending& observation, std::vector<std::string>& warnings) const;
   [[nodiscard]] std::string reason_missing(const std::string& camera_id) const;
 
   std::vector<std::string> camera_ids_;

@@ -91,8 +91,8 @@ json to_json(const SessionSummary& summary) {
 LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started)
     : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
   for (const std::string& id : camera_ids) cameras_[id];
-  for (const char* counter :
-       {"imprints", "repeated", "surplus", "reordered", "refused", "malformed", "missed", "dropped", "results"}) {
+  for (const char* counter : {"imprints", "repeated", "surplus", "reordered", "late", "refused", "malformed", "missed",
+                              "dropped", "results"}) {
     counters_[counter] = 0;
   }
 }
@@ -151,6 +151,11 @@ void LineBoard::set_delivery(const Delivery& delivery, Time now) {
   camera->second.delivery_at = now;
 }
 
+void LineBoard::set_clock(const std::string& camera_id, ClockOffset offset) {
+  const std::lock_guard lock(mutex_);
+  if (const auto camera = cameras_.find(camera_id); camera != cameras_.end()) camera->second.clock = offset;
+}
+
 void LineBoard::set_missing(const std::string& camera_id, std::uint64_t count, const std::string& numbers) {
   const std::lock_guard lock(mutex_);
   const auto camera = cameras_.find(camera_id);
@@ -204,6 +209,7 @@ json LineBoard::status(Time now) const {
       session["observations"].push_back({{"index", state.index},
                                          {"rotation_deg", state.rotation_deg},
                                          {"settled", state.settled},
+                                         {"triggered", state.triggered},
                                          {"reported", state.reported},
                                          {"waiting", state.waiting}});
     }
@@ -219,6 +225,11 @@ json LineBoard::status(Time now) const {
 json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {
   json document = {{"id", id}, {"alive", camera.alive}, {"health", nullptr}, {"last_imprint", nullptr}};
   document["delivery"] = {{"missing", camera.missing}, {"missing_numbers", camera.missing_numbers}, {"node", nullptr}};
+  document["clock"] = nullptr;
+  if (camera.clock) {
+    document["clock"] = {{"offset_s", 1e-9 * static_cast<double>(camera.clock->offset_ns)},
+                         {"uncertainty_s", 1e-9 * static_cast<double>(camera.clock->uncertainty_ns)}};
+  }
   if (camera.delivery) document["delivery"]["node"] = delivery_json(*camera.delivery, age_s(camera.delivery_at, now));
   if (camera.health) document["health"] = health_json(*camera.health, age_s(camera.health_at, now));
   if (camera.imprint) document["last_imprint"] = imprint_json(*camera.imprint, age_s(camera.imprint_at, now));

@@ -52,6 +52,8 @@ class LineBoard {
   void note_imprint(const Imprint& imprint, Time now);
   /// What a camera's node holds that fusion has not confirmed.
   void set_delivery(const Delivery& delivery, Time now);
+  /// The node's clock against this machine's.
+  void set_clock(const std::string& camera_id, ClockOffset offset);
   /// What fusion misses between the imprints of a camera that it has: how many, and which sequence numbers.
   void set_missing(const std::string& camera_id, std::uint64_t count, const std::string& numbers);
   void set_session(CurrentSession session);
@@ -76,6 +78,7 @@ class LineBoard {
     Time imprint_at;
     std::optional<Delivery> delivery;
     Time delivery_at;
+    std::optional<ClockOffset> clock;
     std::uint64_t missing = 0;
     std::string missing_numbers;
   };

@@ -10,7 +10,7 @@
 namespace imprint {
 namespace {
 
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
 constexpr int kBusyTimeoutMs = 2000;  // another process reading (a report, a backup) may hold the file for a moment
 
 constexpr const char* kSchema = R"sql(
@@ -22,7 +22,9 @@ CREATE TABLE message (
   camera TEXT,                       -- NULL: a trigger
   boot_id INTEGER,
   sequence INTEGER,
-  bytes BLOB NOT NULL
+  bytes BLOB NOT NULL,
+  late INTEGER NOT NULL DEFAULT 0,   -- an imprint whose observation had been evaluated without it
+  clock_offset_ns INTEGER            -- its node's clock minus ours; NULL: not known
 );
 CREATE INDEX message_session ON message(session, id);
 CREATE UNIQUE INDEX one_imprint ON message(camera, boot_id, sequence) WHERE camera IS NOT NULL;
@@ -37,6 +39,11 @@ CREATE TABLE result (
   last_message INTEGER NOT NULL      -- newest message of the session when the result was made
 );
 )sql";
+
+// From schema 1, which knew nothing of clocks and of who came late.
+constexpr const char* kFromSchema1 =
+    "ALTER TABLE message ADD COLUMN late INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE message ADD COLUMN clock_offset_ns INTEGER;";
 
 // Whether this program can use the database as it is; its schema's version.
 Result<int> known_version(SQLite::Database& db, const std::filesystem::path& path) {
@@ -77,9 +84,9 @@ class SqliteStore final : public SessionStore {
     if (!version) return pass_on(version.error());
     db_.exec("PRAGMA journal_mode = WAL");
     db_.exec("PRAGMA synchronous = FULL");
-    if (*version == 0) {
+    if (*version < kSchemaVersion) {
       SQLite::Transaction transaction(db_);
-      db_.exec(kSchema);
+      db_.exec(*version == 0 ? kSchema : kFromSchema1);
       db_.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
       transaction.commit();
     }
@@ -87,16 +94,18 @@ class SqliteStore final : public SessionStore {
   }
 
   Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes,
-                           std::int64_t received_ns) override {
+                           const Reception& reception) override {
     return guarded<bool>([&] {
       SQLite::Statement insert(
           db_,
-          "INSERT OR IGNORE INTO message(session, observation, received_ns, camera, boot_id, sequence, bytes) "
-          "VALUES (?, ?, ?, ?, ?, ?, ?)");
+          "INSERT OR IGNORE INTO message(session, observation, received_ns, camera, boot_id, sequence, bytes, "
+          "late, clock_offset_ns) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
       insert.bind(4, imprint.camera_id);
       insert.bind(5, static_cast<std::int64_t>(imprint.boot_id));  // the same 64 bits
       insert.bind(6, static_cast<std::int64_t>(imprint.sequence));
-      return run_insert(insert, imprint.session, imprint.observation, received_ns, bytes, 7);
+      insert.bind(8, reception.late ? 1 : 0);
+      if (reception.clock_offset_ns) insert.bind(9, *reception.clock_offset_ns);
+      return run_insert(insert, imprint.session, imprint.observation, reception.received_ns, bytes, 7);
     });
   }
 
@@ -252,14 +261,19 @@ ORDER BY start.newest, message.sequence)sql");
   Result<std::vector<StoredMessage>> messages(const std::string& session) override {
     return guarded<std::vector<StoredMessage>>([&] {
       SQLite::Statement select(db_,
-                               "SELECT camera IS NULL, received_ns, bytes FROM message WHERE session = ? ORDER BY id");
+                               "SELECT camera IS NULL, received_ns, bytes, late, clock_offset_ns FROM message "
+                               "WHERE session = ? ORDER BY id");
       select.bind(1, session);
       std::vector<StoredMessage> messages;
       while (select.executeStep()) {
         const SQLite::Column blob = select.getColumn(2);
         const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
-        messages.push_back(
-            {select.getColumn(0).getInt() != 0, select.getColumn(1).getInt64(), {bytes, bytes + blob.getBytes()}});
+        StoredMessage message{
+            select.getColumn(0).getInt() != 0,
+            {.received_ns = select.getColumn(1).getInt64(), .late = select.getColumn(3).getInt() != 0},
+            {bytes, bytes + blob.getBytes()}};
+        if (!select.isColumnNull(4)) message.reception.clock_offset_ns = select.getColumn(4).getInt64();
+        messages.push_back(std::move(message));
       }
       return messages;
     });

@@ -37,10 +37,17 @@ struct SessionSummary {
   std::int64_t observations = 0;
 };
 
+/// What else is to be remembered of an imprint's arrival.
+struct Reception {
+  std::int64_t received_ns = 0;                   ///< since the Unix epoch
+  bool late = false;                              ///< its observation had been evaluated without it
+  std::optional<std::int64_t> clock_offset_ns{};  ///< the node's clock minus fusion's, where it was known
+};
+
 /// A message as it was received.
 struct StoredMessage {
   bool is_trigger = false;          ///< else an imprint
-  std::int64_t received_ns = 0;     ///< since the Unix epoch
+  Reception reception;              ///< of a trigger only the time
   std::vector<std::uint8_t> bytes;  ///< as they came over the wire
 };
 
@@ -59,7 +66,7 @@ class SessionStore {
   /// False when this imprint (camera, boot, sequence) is already stored. All writes fail (job_failed) with the
   /// database's own words, e.g. when the disk is full, and have then changed nothing.
   virtual Result<bool> add_imprint(const Imprint& imprint, std::span<const std::uint8_t> bytes,
-                                   std::int64_t received_ns) = 0;
+                                   const Reception& reception) = 0;
   /// False when the same trigger is already stored.
   virtual Result<bool> add_trigger(const Trigger& trigger, std::span<const std::uint8_t> bytes,
                                    std::int64_t received_ns) = 0;

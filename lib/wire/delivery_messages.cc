@@ -66,4 +66,32 @@ Result<Delivery> decode_delivery(std::span<const std::uint8_t> bytes) {
   return delivery;
 }
 
+std::vector<std::uint8_t> encode_clock_question(const ClockQuestion& question) {
+  v1::ClockQuestion message;
+  message.set_schema_version(kSchemaVersion);
+  message.set_offset_known(question.offset_ns.has_value());
+  message.set_offset_ns(question.offset_ns.value_or(0));
+  return bytes_of(message);
+}
+
+Result<ClockQuestion> decode_clock_question(std::span<const std::uint8_t> bytes) {
+  const auto message = parse_message<v1::ClockQuestion>(bytes, kMaxBytes);
+  if (!message) return invalid_input("clock question: {}", message.error().message);
+  return ClockQuestion{message->offset_known() ? std::optional<std::int64_t>(message->offset_ns()) : std::nullopt};
+}
+
+std::vector<std::uint8_t> encode_clock_reading(const ClockReading& reading) {
+  v1::ClockReading message;
+  message.set_schema_version(kSchemaVersion);
+  message.set_received_ns(reading.received_ns);
+  message.set_sent_ns(reading.sent_ns);
+  return bytes_of(message);
+}
+
+Result<ClockReading> decode_clock_reading(std::span<const std::uint8_t> bytes) {
+  const auto message = parse_message<v1::ClockReading>(bytes, kMaxBytes);
+  if (!message) return invalid_input("clock reading: {}", message.error().message);
+  return ClockReading{message->received_ns(), message->sent_ns()};
+}
+
 }  // namespace imprint

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -78,6 +79,21 @@ struct Delivery {
 };
 std::vector<std::uint8_t> encode_delivery(const Delivery& delivery);
 Result<Delivery> decode_delivery(std::span<const std::uint8_t> bytes);
+
+/// Fusion asks a node for its time.
+struct ClockQuestion {
+  std::optional<std::int64_t> offset_ns;  ///< node's clock minus fusion's, as measured before
+};
+std::vector<std::uint8_t> encode_clock_question(const ClockQuestion& question);
+Result<ClockQuestion> decode_clock_question(std::span<const std::uint8_t> bytes);
+
+/// The node's answer, times by its clock since the Unix epoch.
+struct ClockReading {
+  std::int64_t received_ns = 0;  ///< when the question came
+  std::int64_t sent_ns = 0;      ///< when the answer left
+};
+std::vector<std::uint8_t> encode_clock_reading(const ClockReading& reading);
+Result<ClockReading> decode_clock_reading(std::span<const std::uint8_t> bytes);
 
 /// A `Result` message: the JSON document of `imprint.result/1` with its session and whether it is the last.
 struct ResultMessage {

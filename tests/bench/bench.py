@@ -2,6 +2,7 @@
 """./dev bench [NAME]: what the node costs and how near the truth the measurement comes.
 
 stages    renders one frame of the forge scene; prints the time of every stage beside cv::Canny, and of the renderer.
+latency   trigger to stored result over Zenoh on loopback, the nodes' work already done: median and 99th percentile.
 accuracy  renders and measures several seeds of both scenes; prints the errors against the truth.
 targets   the paper's target benchmark, recall and precision beside OpenCV's ArUco; only when asked for.
 centers   the spread of rendered targets' centres beside the bound, their bias, the stated sigma; only when asked for.
@@ -47,6 +48,16 @@ def bench_stages(folder, _):
     print(f"renderer: {user / frames:.2f} s of one core a frame ({(time.monotonic() - begin) / frames:.2f} s by the clock), PNG included")
 
 
+def bench_latency(folder, options):
+    folder.mkdir(parents=True, exist_ok=True)
+    integration = ROOT / "tests" / "integration"
+    command = [sys.executable, integration / "latency.py", folder, "--observations", options.observations]
+    done = subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, text=True, check=False)
+    print(done.stdout, end="")
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
 def bench_accuracy(folder, options):
     rows = []
     for scene, observations in (("forge", 1), ("forge", 3), ("laboratory", 1)):
@@ -76,9 +87,10 @@ def print_row(scene, observations, seed, values):
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     papers = {"targets": "targets", "clutter": "targets", "centers": "targets", "calibration": "calibration", "survey": "survey"}
-    parser.add_argument("name", nargs="?", choices=["stages", "accuracy", "silhouettes", *papers], help="default: stages and accuracy")
+    parser.add_argument("name", nargs="?", choices=["stages", "latency", "accuracy", "silhouettes", *papers], help="default: the first three")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)
+    parser.add_argument("--observations", type=int, default=100, help="of latency")
     options = parser.parse_args()
     if options.name == "silhouettes":
         tables = ROOT / "tests" / "paper" / "silhouettes" / "tables.py"
@@ -86,7 +98,7 @@ def main():
     if options.name in papers:
         bench = BUILD / "tests" / "paper" / papers[options.name] / f"{options.name}_bench"
         sys.exit(subprocess.run([bench], check=False).returncode)
-    for name, bench in (("stages", bench_stages), ("accuracy", bench_accuracy)):
+    for name, bench in (("stages", bench_stages), ("latency", bench_latency), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")
             with tempfile.TemporaryDirectory(prefix="imprint-bench-") as folder:

@@ -57,6 +57,9 @@ class FaultTest(unittest.TestCase):
     def test_fusion_with_a_full_disk_stops_with_an_alarm_and_goes_on_when_there_is_room(self):
         faults.fusion_disk_full(work, ready)
 
+    def test_clocks_that_jump_by_an_hour_harm_no_grouping(self):
+        faults.clock_jumps(work, ready)
+
     def test_a_hostile_client_takes_bounded_memory_and_changes_nothing(self):
         figures = faults.hostile_client(work, ready, python, messages=5000)
         self.assertLess(figures["fusion_grew_mb"], 150)

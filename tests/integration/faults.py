@@ -224,6 +224,56 @@ def fusion_disk_full(work, ready):
         return line.account()
 
 
+def clock_jumps(work, ready, jump_s=3600):
+    """A node whose clock is an hour ahead, then right; then fusion's an hour ahead, then right."""
+    with ReadyLine(work, ready) as line:
+        def shift(name, seconds):
+            (line.folder / f"{name}.shift").write_text(f"{seconds}\n", encoding="utf-8")
+
+        def shifted(name):
+            shift(name, 0)
+            # A program with sanitizers wants to be first; this one is not in their way.
+            return {"LD_PRELOAD": os.environ["IMPRINT_CLOCK_SHIFT"], "CLOCK_SHIFT_FILE": str(line.folder / f"{name}.shift"),
+                    "ASAN_OPTIONS": "verify_asan_link_order=0"}
+
+        def measured(camera, seconds):
+            index = CAMERAS.index(camera)
+            return line.wait_for(lambda status: (clock := status["cameras"][index]["clock"]) and
+                                 abs(clock["offset_s"] - seconds) < 1, f"{camera}'s clock {seconds} s off")
+
+        def take(session, in_s=0):
+            line.trigger_until_taken(session, in_s=in_s)
+            line.wait_for_results([session])
+            (text,), = line.stored(f"SELECT json_extract(json, '$.warnings') FROM result WHERE session = '{session}'")
+            return text
+
+        line.start_fusion(**shifted("fusion"))
+        line.start_nodes("cam1", "cam3")
+        environment = shifted("cam2")
+        shift("cam2", jump_s)
+        line.start("cam2", line.node_command("cam2"), environment)
+        line.wait_alive(*CAMERAS)
+        status = measured("cam2", jump_s)
+        clock = status["cameras"][1]["clock"]
+        assert "clock_cam2" in alarms(status), status["alarms"]
+        warnings = take("ahead", in_s=2)
+        assert f"the clock of cam2 was {jump_s}.0 s ahead" in warnings, warnings
+        assert "took its frame" not in warnings, warnings  # it fired with the others, by fusion's clock
+        shift("cam2", 0)
+        take("jumped-back")
+        measured("cam2", 0)
+        assert take("right") == "[]"
+        shift("fusion", jump_s)
+        take("fusion-ahead")
+        measured("cam1", -jump_s)
+        shift("fusion", 0)
+        take("fusion-right")
+        account = line.account()
+        assert (account["results"], account["results made anew"]) == (5, 0), account
+        return {"jump_s": jump_s, "measured_s": round(clock["offset_s"], 4),
+                "uncertainty_s": round(clock["uncertainty_s"], 4), **account}
+
+
 def peak_mb(process):
     fields = dict(line.split(":", 1) for line in pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines())
     return int(fields["VmHWM"].split()[0]) / 1024

@@ -284,4 +284,68 @@ TEST_CASE("receive: open triggers are those a camera has still to answer") {
   REQUIRE(assembler.open_triggers("cam2").empty());
 }
 
+TEST_CASE("receive: an imprint that comes after the evaluation is late, and the result says so") {
+  auto assembler = three_cameras();
+  REQUIRE(assembler.add(trigger(0, 0.0, 1), after(0)));
+  assembler.add(answer("cam1", 0, 0.0), after(0.1));
+  assembler.add(answer("cam2", 0, 0.0), after(0.1));
+  const Imprint third = answer("cam3", 0, 0.0);
+  REQUIRE_FALSE(assembler.is_late(third, after(9.9)));
+  REQUIRE(assembler.is_late(third, after(10.0)));
+  assembler.settle(after(11));
+  REQUIRE(assembler.is_late(third, after(11)));
+  REQUIRE_FALSE(assembler.is_late(answer("cam2", 0, 0.0), after(11)));  // it is there
+  REQUIRE_FALSE(assembler.is_late(answer("cam3", 1, 0.0), after(11)));  // nobody has waited for that one
+  assembler.add(third, after(12), {.late = true});
+  REQUIRE(assembler.settle(after(12)) == std::vector<std::string>{"S"});
+  REQUIRE(mentions(assembler.warnings("S"), "the imprint of cam3 came late"));
+}
+
+TEST_CASE("receive: a clock that is off by an hour harms no grouping, is corrected and named") {
+  auto assembler = three_cameras();
+  const std::int64_t hour_ns = 3'600'000'000'000, now_ns = 1'700'000'000'000'000'000;
+  REQUIRE(assembler.add(trigger(0, 0.0, 1), after(0)));
+  for (const char* camera : {"cam1", "cam2", "cam3"}) {
+    Imprint imprint = answer(camera, 0, 0.0);
+    const std::int64_t offset_ns = camera == std::string("cam2") ? hour_ns : 1'000'000;
+    imprint.sensor_time_ns = now_ns + offset_ns;
+    assembler.add(imprint, after(1), {.clock_offset_ns = offset_ns});
+  }
+  REQUIRE(assembler.settle(after(1)) == std::vector<std::string>{"S"});
+  REQUIRE(assembler.observations("S")[0].imprints.size() == 3);
+  const auto warnings = assembler.warnings("S");
+  REQUIRE(warnings.size() == 1);
+  REQUIRE(mentions(warnings, "the clock of cam2 was 3600.0 s ahead of fusion's"));
+}
+
+TEST_CASE("receive: frames that were not taken at the same time are named, as far as clocks are known") {
+  auto assembler = three_cameras();
+  REQUIRE(assembler.add(trigger(0, 0.0, 1), after(0)));
+  for (const auto& [camera, s] : {std::pair("cam1", 0.0), std::pair("cam2", 2.5), std::pair("cam3", 900.0)}) {
+    Imprint imprint = answer(camera, 0, 0.0);
+    imprint.sensor_time_ns = static_cast<std::int64_t>(1e9 * s);
+    Circumstances circumstances;
+    if (s < 100.0) circumstances.clock_offset_ns = 0;  // that of the third has not been measured
+    assembler.add(imprint, after(1), circumstances);
+  }
+  assembler.settle(after(1));
+  REQUIRE(assembler.warnings("S") ==
+          std::vector<std::string>{
+              "observation 0: cam2 took its frame 2.5 s after cam1; the forging must have stood still"});
+}
+
+TEST_CASE("receive: a session that leaves with its result still to be made is given back") {
+  auto assembler = three_cameras(2);
+  assembler.add(answer("cam1", 0, 0.0, 1, 1, "A"), after(0));
+  assembler.add(answer("cam1", 0, 0.0, 2, 1, "B"), after(1));
+  REQUIRE_FALSE(assembler.has_room());
+  assembler.add(answer("cam1", 0, 0.0, 3, 1, "C"), after(2));
+  REQUIRE(assembler.take_displaced() == std::vector<std::string>{"A"});
+  REQUIRE(assembler.take_displaced().empty());
+  assembler.settle(after(20));
+  REQUIRE(assembler.has_room());
+  assembler.add(answer("cam1", 0, 0.0, 4, 1, "D"), after(21));
+  REQUIRE(assembler.take_displaced().empty());  // the one that left was settled
+}
+
 }  // namespace imprint

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "lib/clock/wall_clock.h"
 #include "tests/unit/temporary_folder.h"
 
 namespace imprint {
@@ -346,6 +347,35 @@ TEST_CASE("fusion: taken up again, a result that comes out the same is neither s
   REQUIRE(plant.store->result("S")->value().json == before);
   REQUIRE(plant.result_count() == 1);
   REQUIRE(std::filesystem::exists(plant.folder / "results/S/result.json"));  // as if killed before it was written
+}
+
+TEST_CASE("fusion: a node's clock is measured when it comes, alarmed about when it is off, and told to the node") {
+  Plant plant;
+  constexpr std::int64_t kHourNs = 3'600'000'000'000;
+  std::mutex mutex;
+  std::optional<std::int64_t> told_ns;
+  const auto clock = plant.outside->answer(plant.keys.service("cam2", "clock"), [&](std::shared_ptr<Query> query) {
+    const auto question = decode_clock_question(query->payload());
+    {
+      const std::lock_guard lock(mutex);
+      if (question->offset_ns) told_ns = *question->offset_ns;
+    }
+    (void)query->reply(encode_clock_reading({wall_clock_ns() - kHourNs, wall_clock_ns() - kHourNs}));
+  });
+  const auto measured = [&] { return plant.status()["cameras"][1]["clock"]; };
+  auto token = plant.outside->announce(plant.keys.alive("cam2"));
+  REQUIRE(eventually([&] { return measured().is_object(); }));
+  REQUIRE(measured()["offset_s"].get<double>() == Approx(-3600.0).margin(0.5));  // a busy machine
+  REQUIRE(measured()["uncertainty_s"].get<double>() < 0.5);
+  REQUIRE(plant.status()["alarms"][0]["name"] == "clock_cam2");
+  REQUIRE(plant.status()["cameras"][0]["clock"].is_null());
+  (*token).reset();
+  token = plant.outside->announce(plant.keys.alive("cam2"));  // asked again at once
+  REQUIRE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return told_ns.has_value();
+  }));
+  REQUIRE(1e-9 * static_cast<double>(*told_ns) == Approx(-3600.0).margin(0.5));
 }
 
 TEST_CASE("fusion: its turns are counted while it is idle and while it works, not while a fusion hangs") {

@@ -40,8 +40,8 @@ TEST_CASE("store: what was received comes back byte for byte and in order, also 
   {
     auto store = open(folder / "a.db");
     REQUIRE(*store->add_trigger({"S", 0, 0.0, 0, 1}, Bytes{9}, 10));
-    REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1, 0, 2}, 11));
-    REQUIRE(*store->add_imprint(imprint_of("cam2", 1), Bytes{0, 255}, 12));
+    REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1, 0, 2}, {11}));
+    REQUIRE(*store->add_imprint(imprint_of("cam2", 1), Bytes{0, 255}, {12, true, -3}));
   }
   auto store = open(folder / "a.db");
   const auto messages = *store->messages("S");
@@ -49,16 +49,38 @@ TEST_CASE("store: what was received comes back byte for byte and in order, also 
   REQUIRE(messages[0].is_trigger);
   REQUIRE(messages[1].bytes == Bytes{1, 0, 2});
   REQUIRE(messages[2].bytes == Bytes{0, 255});
-  REQUIRE(messages[2].received_ns == 12);
+  REQUIRE(messages[2].reception.received_ns == 12);
+  REQUIRE(messages[2].reception.late);
+  REQUIRE(messages[2].reception.clock_offset_ns == -3);
+  REQUIRE_FALSE(messages[1].reception.late);
+  REQUIRE_FALSE(messages[1].reception.clock_offset_ns);
   REQUIRE_FALSE(messages[2].is_trigger);
+}
+
+TEST_CASE("store: a database of schema 1 is taken over with what it holds") {
+  const TemporaryFolder folder;
+  {
+    auto store = open(folder / "a.db");
+    REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1, 0, 2}, {11}));
+  }
+  {
+    SQLite::Database db(folder / "a.db", SQLite::OPEN_READWRITE);
+    db.exec(
+        "ALTER TABLE message DROP COLUMN late; ALTER TABLE message DROP COLUMN clock_offset_ns;"
+        "PRAGMA user_version = 1");
+  }
+  auto store = open(folder / "a.db");
+  REQUIRE(store->messages("S")->at(0).bytes == Bytes{1, 0, 2});
+  REQUIRE(*store->add_imprint(imprint_of("cam2", 1), Bytes{3}, {12, true, 5}));
+  REQUIRE(store->messages("S")->at(1).reception.late);
 }
 
 TEST_CASE("store: an imprint or a trigger that is there already is not stored again") {
   const TemporaryFolder folder;
   auto store = open(folder / "a.db");
-  REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1}, 1));
-  REQUIRE_FALSE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1}, 2));
-  REQUIRE(*store->add_imprint(imprint_of("cam1", 1, "S", 0xFFFFFFFFFFFFFFFFULL), Bytes{1}, 2));  // another boot
+  REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1}, {1}));
+  REQUIRE_FALSE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1}, {2}));
+  REQUIRE(*store->add_imprint(imprint_of("cam1", 1, "S", 0xFFFFFFFFFFFFFFFFULL), Bytes{1}, {2}));  // another boot
   REQUIRE(*store->add_trigger({"S", 0, 0.0, 0, 1}, Bytes{7}, 3));
   REQUIRE_FALSE(*store->add_trigger({"S", 0, 0.0, 0, 1}, Bytes{7}, 4));
   REQUIRE(*store->add_trigger({"S", 0, 90.0, 0, 1}, Bytes{8}, 4));
@@ -92,12 +114,12 @@ TEST_CASE("store: unfinished sessions are those without a complete result or wit
   const TemporaryFolder folder;
   auto store = open(folder / "a.db");
   for (const char* session : {"done", "open", "none", "late"}) {
-    REQUIRE(store->add_imprint(imprint_of("cam1", 1, session, std::hash<std::string>{}(session)), Bytes{1}, 1));
+    REQUIRE(store->add_imprint(imprint_of("cam1", 1, session, std::hash<std::string>{}(session)), Bytes{1}, {1}));
   }
   REQUIRE(store->put_result(result_of("done", true, "{}")));
   REQUIRE(store->put_result(result_of("open", false, "{}")));
   REQUIRE(store->put_result(result_of("late", true, "{}")));
-  REQUIRE(store->add_imprint(imprint_of("cam2", 1, "late"), Bytes{1}, 2));
+  REQUIRE(store->add_imprint(imprint_of("cam2", 1, "late"), Bytes{1}, {2}));
   REQUIRE(*store->unfinished(10) == std::vector<std::string>{"open", "none", "late"});
   REQUIRE(*store->unfinished(1) == std::vector<std::string>{"late"});
   // Evaluating it again with the same outcome settles it all the same.
@@ -112,7 +134,7 @@ TEST_CASE("store: a process killed without warning loses nothing it was told is 
   const pid_t child = ::fork();
   if (child == 0) {
     auto store = SessionStore::open(folder / "a.db");
-    for (std::uint64_t i = 1; i <= 50; ++i) (void)(*store)->add_imprint(imprint_of("cam1", i), Bytes{1, 2, 3}, 1);
+    for (std::uint64_t i = 1; i <= 50; ++i) (void)(*store)->add_imprint(imprint_of("cam1", i), Bytes{1, 2, 3}, {1});
     ::kill(::getpid(), SIGKILL);
   }
   int status = 0;

@@ -211,6 +211,31 @@ TEST_CASE("node: a trigger fires at its moment; one of clocks that disagree fire
   REQUIRE(imprints[1].warnings.back().find("check the clocks") != std::string::npos);
 }
 
+TEST_CASE("node: it tells its time, and fires by fusion's clock once it knows the difference") {
+  Line line;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  const auto now_ns = [] {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+  };
+  const std::int64_t hour_ns = 3'600'000'000'000;  // as if this node were an hour ahead
+  const std::int64_t before_ns = now_ns();
+  const auto replies = line.fusion_side->get(line.keys.service("cam1", "clock"), encode_clock_question({hour_ns}), 5s);
+  REQUIRE(replies);
+  REQUIRE(replies->size() == 1);
+  const auto reading = decode_clock_reading(replies->front().payload);
+  REQUIRE(reading);
+  REQUIRE(reading->received_ns >= before_ns);
+  REQUIRE(reading->sent_ns >= reading->received_ns);
+  REQUIRE(reading->sent_ns <= now_ns());
+  const auto begin = std::chrono::steady_clock::now();
+  line.fire(0, now_ns() - hour_ns + 300'000'000);  // in 0.3 s by fusion's clock
+  REQUIRE(line.wait_for_imprints(1).size() == 1);
+  REQUIRE(std::chrono::steady_clock::now() - begin > 250ms);
+  REQUIRE(line.wait_for_imprints(1)[0].warnings.size() == 1);  // that of the picture alone
+}
+
 TEST_CASE("node: it stops at once while it waits for a trigger's moment, and malformed triggers change nothing") {
   Line line;
   NodeService node(config(), line.source, seen, *line.node_side);
