@@ -27,8 +27,8 @@ class BackdropPainter {
         rough_(noise_tile(random_.bits(), tile_px, 0.85)),
         image_(size_, CV_32F, cv::Scalar(level_)) {}
 
-  cv::Mat hall() {
-    if (clutter_ <= 0.0) return image_;
+  void hall() {
+    if (clutter_ <= 0.0) return;
     base(0.45, 0.35);
     repeat(12, [&] { panel(random_.uniform(300, 1400), random_.uniform(200, 1000), random_.uniform(0.3, 1.6), 0.35); });
     repeat(46, [&] { panel(random_.uniform(40, 420), random_.uniform(30, 320), random_.uniform(0.2, 3.0), 0.5); });
@@ -38,11 +38,10 @@ class BackdropPainter {
     repeat(60, [&] { round(random_.uniform(3, 22), random_.uniform(0.2, 5.0)); });
     repeat(5, [&] { lamp(); });
     cv::max(image_, 0.002, image_);
-    return image_;
   }
 
-  cv::Mat wall() {
-    if (clutter_ <= 0.0) return image_;
+  void wall() {
+    if (clutter_ <= 0.0) return;
     const double slope_x = random_.uniform(-0.12, 0.12), slope_y = random_.uniform(-0.12, 0.12);
     for (int y = 0; y < size_.height; ++y) {
       float* row = image_.ptr<float>(y);
@@ -61,8 +60,32 @@ class BackdropPainter {
       quadrilateral(at, random_.uniform(60, 260), random_.uniform(200, 900), random_.uniform(-0.2, 0.2),
                     level_ * random_.uniform(0.15, 0.8), 0.06);
     });
-    return image_;
   }
+
+  // Windows, lit beams, uprights and gratings that stand out more than the forging; narrower or wider than one, or
+  // short. They draw from a stream of their own, so that the rest of the hall stays as it is.
+  void strong(std::uint64_t seed, double density, double level) {
+    if (density <= 0.0) return;
+    random_ = Random(seed);
+    level_ = level, clutter_ = density;
+    const auto bright = [&] { return random_.uniform(0.75, 1.0); };
+    repeat(3, [&] {
+      quadrilateral(anywhere(), random_.uniform(800, 3000), random_.uniform(12, 60), random_.normal() * 0.12,
+                    level_ * bright(), 0.08);
+    });
+    repeat(3, [&] {
+      quadrilateral(anywhere(), random_.uniform(20, 120), random_.uniform(400, 2500), random_.normal() * 0.1,
+                    level_ * bright(), 0.08);
+    });
+    repeat(5, [&] {
+      const double side = random_.uniform(60, 420);
+      quadrilateral(anywhere(), side, side * random_.uniform(0.7, 1.4), random_.normal() * 0.3, level_ * bright(), 0.1);
+    });
+    repeat(2, [&] { grating(); });
+    repeat(8, [&] { round(random_.uniform(8, 60), bright()); });
+  }
+
+  [[nodiscard]] const cv::Mat& image() const { return image_; }
 
  private:
   template <class Paint>
@@ -213,7 +236,11 @@ class BackdropPainter {
 
 cv::Mat paint_backdrop(const Scene& scene, int camera) {
   BackdropPainter painter(scene, camera);
-  return scene.kind == SceneKind::forge ? painter.hall() : painter.wall();
+  if (scene.kind == SceneKind::forge) painter.hall();
+  if (scene.kind == SceneKind::laboratory) painter.wall();
+  painter.strong(stream_seed(scene.seed, "strong clutter", static_cast<std::uint64_t>(camera)),
+                 scene.backdrop.strong_clutter, scene.backdrop.strong_level);
+  return painter.image();
 }
 
 }  // namespace imprint

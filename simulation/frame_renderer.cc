@@ -10,6 +10,7 @@
 #include "simulation/coverage.h"
 #include "simulation/haze.h"
 #include "simulation/plate_painter.h"
+#include "simulation/props.h"
 #include "simulation/random.h"
 #include "simulation/sensor.h"
 #include "simulation/silhouette_outline.h"
@@ -123,14 +124,17 @@ Result<cv::Mat> render_frame_on(const cv::Mat& backdrop, const Scene& scene, con
   const Haze haze(scene, layout, observation, camera);
   cv::Mat image = backdrop.clone();
   paint_plates(scene, layout, camera, haze, image);
+  const auto props = props_of(scene, layout, observation, camera);
+  paint_props(props, false, image);
   auto polygon = outline->polygon();
   displace(polygon, haze);
   const Coverage coverage = polygon_coverage(polygon, image.size());
-  if (!coverage.region.empty()) {
+  if (scene.forging.present && !coverage.region.empty()) {
     const cv::Mat light = lay_body(scene, layout, observation, camera, coverage, image);
     add_halo(scene, light, coverage.region, image);
     add_sparks(scene, *outline, observation, camera, image);
   }
+  paint_props(props, true, image);
   blur(scene.imaging.blur_sigma_px, image);
   return expose(
       scene.imaging,

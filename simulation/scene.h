@@ -26,6 +26,7 @@ struct Station {
 
 /// The body whose geometry is the truth. Lengths in mm.
 struct ForgingScene {
+  bool present = true;  ///< false: an empty hall; everything else stands as if the forging lay there
   double length_mm = 1900.0;
   std::vector<Station> stations;  ///< ascending, the first at 0
   double transition_mm = 30.0;    ///< length of a step; longer where the step is high, so that no camera sees behind it
@@ -77,8 +78,35 @@ struct TargetScene {
 };
 
 struct BackdropScene {
-  double level = 0.05;   ///< mean grey of the hall or the wall, share of full scale
-  double clutter = 1.0;  ///< density of beams, boxes, lamps and bright bars; 0: an even wall
+  double level = 0.05;          ///< mean grey of the hall or the wall, share of full scale
+  double clutter = 1.0;         ///< density of beams, boxes, lamps and bright bars; 0: an even wall
+  double strong_clutter = 0.0;  ///< density of windows, lit beams and gratings (laboratory: black ones) of strong_level
+  double strong_level = 0.9;    ///< share of full scale
+};
+
+/// A manipulator that holds one end between two V-shaped jaws.
+struct JawScene {
+  enum class End { none, first, second };
+  End holds = End::none;
+  double cover_mm = 250.0;  ///< of the forging's length lies between the jaws
+  double level = 0.03;      ///< share of full scale
+};
+
+/// V-shaped blocks that the forging lies on.
+struct BlockScene {
+  std::vector<double> at_mm;  ///< their middles along the forging
+  double width_mm = 80.0;     ///< along the forging
+  double level = 0.2;         ///< share of full scale
+};
+
+/// Another hot body (laboratory: another dark one).
+struct OtherBody {
+  bool flat = false;  ///< a door or opening that faces world y instead of a round bar
+  Eigen::Vector3d center_world_mm = Eigen::Vector3d::Zero();
+  double length_mm = 1000.0;
+  double diameter_mm = 200.0;             ///< flat: height
+  double yaw_deg = 0.0, pitch_deg = 0.0;  ///< of its axis, as the forging's
+  double level = 0.8;                     ///< share of full scale
 };
 
 struct ObservationScene {
@@ -108,6 +136,9 @@ struct Scene {
   ImagingScene imaging;
   TargetScene targets;
   BackdropScene backdrop;
+  JawScene jaw;
+  BlockScene v_blocks;
+  std::vector<OtherBody> others;
   ObservationScene observations;
   ForgingSpec spec;  ///< what rig.toml tells the measurement
   std::vector<SceneCamera> cameras;

@@ -68,9 +68,10 @@ void read_stations(TomlReader& read, const toml::table& table, ForgingScene& for
 
 ForgingScene read_forging(TomlReader& read, const toml::table& table) {
   know_keys(read, table, "forging",
-            {"length_mm", "stations", "transition_mm", "eccentricity_mm", "bow_mm", "kink_mm", "circularity_mm",
-             "press_marks", "press_mark_depth_mm", "center_mm", "yaw_deg", "pitch_deg"});
+            {"present", "length_mm", "stations", "transition_mm", "eccentricity_mm", "bow_mm", "kink_mm",
+             "circularity_mm", "press_marks", "press_mark_depth_mm", "center_mm", "yaw_deg", "pitch_deg"});
   ForgingScene f;
+  f.present = read.boolean("forging.present", f.present);
   f.length_mm = within(read, "forging.length_mm", f.length_mm, 10.0, 50000.0);
   read_stations(read, table, f);
   f.transition_mm = within(read, "forging.transition_mm", f.transition_mm, 0.5, f.length_mm);
@@ -137,11 +138,55 @@ TargetScene read_targets(TomlReader& read, const toml::table& table) {
 }
 
 BackdropScene read_backdrop(TomlReader& read, const toml::table& table) {
-  know_keys(read, table, "backdrop", {"level", "clutter"});
+  know_keys(read, table, "backdrop", {"level", "clutter", "strong_clutter", "strong_level"});
   BackdropScene b;
   b.level = within(read, "backdrop.level", b.level, 0.0, 1.0);
   b.clutter = within(read, "backdrop.clutter", b.clutter, 0.0, 10.0);
+  b.strong_clutter = within(read, "backdrop.strong_clutter", b.strong_clutter, 0.0, 10.0);
+  b.strong_level = within(read, "backdrop.strong_level", b.strong_level, 0.0, 2.0);
   return b;
+}
+
+JawScene read_jaw(TomlReader& read, const toml::table& table, double length_mm) {
+  know_keys(read, table, "jaw", {"holds", "cover_mm", "level"});
+  JawScene j;
+  const std::string end = read.string("jaw.holds", "none");
+  if (end != "none" && end != "first" && end != "second")
+    read.fault("jaw.holds", fmt::format("expected \"none\", \"first\" or \"second\", found \"{}\"", end));
+  j.holds = end == "first" ? JawScene::End::first : end == "second" ? JawScene::End::second : JawScene::End::none;
+  j.cover_mm = within(read, "jaw.cover_mm", std::min(j.cover_mm, 0.5 * length_mm), 1.0, 0.5 * length_mm);
+  j.level = within(read, "jaw.level", j.level, 0.0, 2.0);
+  return j;
+}
+
+BlockScene read_blocks(TomlReader& read, const toml::table& table, double length_mm) {
+  know_keys(read, table, "v_blocks", {"at_mm", "width_mm", "level"});
+  BlockScene b;
+  b.at_mm = read.numbers("v_blocks.at_mm", 0, b.at_mm);
+  for (const double at : b.at_mm) {
+    if (!(at >= 0.0 && at <= length_mm))
+      read.fault("v_blocks.at_mm", fmt::format("expected 0 to length_mm ({}), found {}", length_mm, at));
+  }
+  b.width_mm = within(read, "v_blocks.width_mm", b.width_mm, 1.0, 5000.0);
+  b.level = within(read, "v_blocks.level", b.level, 0.0, 2.0);
+  return b;
+}
+
+OtherBody read_other(TomlReader& read, const toml::table& entry) {
+  know_keys(read, entry, "", {"shape", "center_mm", "length_mm", "diameter_mm", "yaw_deg", "pitch_deg", "level"});
+  OtherBody o;
+  const std::string shape = read.string("shape", "round");
+  if (shape != "round" && shape != "flat")
+    read.fault("shape", fmt::format("expected \"round\" or \"flat\", found \"{}\"", shape));
+  o.flat = shape == "flat";
+  const auto center = read.numbers("center_mm", 3);
+  o.center_world_mm = {center[0], center[1], center[2]};
+  o.length_mm = within(read, "length_mm", o.length_mm, 1.0, 50000.0);
+  o.diameter_mm = within(read, "diameter_mm", o.diameter_mm, 1.0, 20000.0);
+  o.yaw_deg = within(read, "yaw_deg", o.yaw_deg, -180.0, 180.0);
+  o.pitch_deg = within(read, "pitch_deg", o.pitch_deg, -90.0, 90.0);
+  o.level = within(read, "level", o.level, 0.0, 2.0);
+  return o;
 }
 
 ObservationScene read_observations(TomlReader& read, const toml::table& table) {
@@ -238,7 +283,8 @@ Result<Scene> read_scene(const std::filesystem::path& path) {
   if (!table) return pass_on(table.error());
   TomlReader read(path, *table);
   know_keys(read, *table, "",
-            {"scene", "forging", "surface", "imaging", "targets", "backdrop", "observations", "rig", "camera"});
+            {"scene", "forging", "surface", "imaging", "targets", "backdrop", "observations", "rig", "camera", "jaw",
+             "v_blocks", "other"});
   know_keys(read, *table, "scene", {"name", "kind", "seed", "corruption"});
   Scene scene;
   scene.name = read.string("scene.name", path.stem().string());
@@ -253,10 +299,12 @@ Result<Scene> read_scene(const std::filesystem::path& path) {
   scene.imaging = read_imaging(read, *table);
   scene.targets = read_targets(read, *table);
   scene.backdrop = read_backdrop(read, *table);
+  scene.jaw = read_jaw(read, *table, scene.forging.length_mm);
+  scene.v_blocks = read_blocks(read, *table, scene.forging.length_mm);
   scene.observations = read_observations(read, *table);
   scene.spec = read_spec(read, *table, scene.kind);
   if (!read.error()) check_sections(read, scene);
-  const auto entries = read.tables("camera");
+  const auto entries = read.tables("camera"), others = read.tables("other");
   if (entries.empty()) read.fault("camera", "expected at least one camera, headed [[camera]]");
   if (read.error()) return pass_on(*read.error());
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -266,6 +314,11 @@ Result<Scene> read_scene(const std::filesystem::path& path) {
       read_entry.fault("id", fmt::format("\"{}\" stands there twice", camera.model.id));
     if (read_entry.error()) return pass_on(*read_entry.error());
     scene.cameras.push_back(std::move(camera));
+  }
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    TomlReader read_entry(path, *others[i], fmt::format("other[{}].", i));
+    scene.others.push_back(read_other(read_entry, *others[i]));
+    if (read_entry.error()) return pass_on(*read_entry.error());
   }
   return scene;
 }

@@ -10,6 +10,7 @@
 
 #include "simulation/plate_layout.h"
 #include "simulation/plate_painter.h"
+#include "simulation/props.h"
 #include "simulation/silhouette_outline.h"
 
 namespace imprint {
@@ -94,9 +95,10 @@ std::vector<AxisPoint> axis_points(const ForgingBody& body) {
 }
 
 Result<ordered_json> camera_truth(const Scene& scene, const Layout& layout, const std::vector<AxisPoint>& axis,
-                                  const BodyPose& body_pose, std::size_t camera) {
+                                  std::size_t observation, std::size_t camera) {
   const CameraModel& model = scene.cameras[camera].model;
   const CameraPose& pose = layout.poses[camera];
+  const BodyPose& body_pose = layout.body_poses[observation];
   const auto outline = body_outline(layout.body, body_pose, model, pose, 1.0 / vertices_per_px);
   if (!outline) return pass_on(outline.error());
   std::vector<ObservedPoint> axis_image;
@@ -109,12 +111,18 @@ Result<ordered_json> camera_truth(const Scene& scene, const Layout& layout, cons
   json["center_mm"] = numbers(pose.center_world_mm);
   json["R_cam_world"] = numbers(pose.R_cam_world);
   json["targets"] = seen_targets(scene, layout, camera);
+  if (!scene.forging.present) return json;
+  const auto props = props_of(scene, layout, static_cast<int>(observation), static_cast<int>(camera));
   json["upper"] = curve(outline->upper);
   json["lower"] = curve(outline->lower);
   json["axis"] = ordered_json::array();
   for (const ObservedPoint& p : axis_image) json["axis"].push_back(pixel(p));
   json["start_px"] = pixel(outermost(outline->first_end, axis_image.back(), axis_image.front()));
   json["end_px"] = pixel(outermost(outline->second_end, axis_image.front(), axis_image.back()));
+  if (!props.empty()) {
+    json["upper_hidden_mm"] = hidden_ranges_mm(props, outline->upper, layout.body.length_mm());
+    json["lower_hidden_mm"] = hidden_ranges_mm(props, outline->lower, layout.body.length_mm());
+  }
   return json;
 }
 
@@ -157,6 +165,7 @@ Result<std::string> truth_json(const Scene& scene, const Layout& layout) {
   json["schema"] = "imprint.truth/1";
   json["scene"] = scene.name;
   json["seed"] = scene.seed;
+  if (!scene.forging.present) json["present"] = false;
   json["length_mm"] = layout.body.length_mm();
   json["end_section_mm"] = scene.spec.end_section_mm;
   add_sections(layout, axis, json);
@@ -172,7 +181,7 @@ Result<std::string> truth_json(const Scene& scene, const Layout& layout) {
                              {"origin_world_mm", numbers(frame.origin_world_mm)},
                              {"cameras", ordered_json::array()}};
     for (std::size_t c = 0; c < scene.cameras.size(); ++c) {
-      auto camera = camera_truth(scene, layout, axis, pose, c);
+      auto camera = camera_truth(scene, layout, axis, i, c);
       if (!camera) return pass_on(camera.error());
       observation["cameras"].push_back(std::move(*camera));
     }

@@ -55,6 +55,37 @@ TEST_CASE("scene file: a value out of range is named by line and key") {
   CHECK_THAT(message, Catch::Contains("imaging.bits") && Catch::Contains("12"));
 }
 
+TEST_CASE("scene file: manipulator, V-blocks, other bodies and an empty hall are read, and their faults named") {
+  const TemporaryFolder folder;
+  const std::string more =
+      "\n[jaw]\nholds = \"second\"\ncover_mm = 300.0\n[v_blocks]\nat_mm = [400.0, 1500.0]\n"
+      "[[other]]\nshape = \"flat\"\ncenter_mm = [0.0, -900.0, 700.0]\nlevel = 0.5\n";
+  std::string text = scene_text();
+  const std::string key = "length_mm = 1900.0";
+  text.insert(text.find(key), "present = false\n");
+  const auto scene = read_scene(folder.write("scene.toml", text + more));
+  REQUIRE(scene);
+  CHECK_FALSE(scene->forging.present);
+  CHECK(scene->jaw.holds == JawScene::End::second);
+  CHECK(scene->jaw.cover_mm == 300.0);
+  CHECK(scene->v_blocks.at_mm == std::vector<double>{400.0, 1500.0});
+  REQUIRE(scene->others.size() == 1);
+  CHECK(scene->others[0].flat);
+  CHECK(scene->others[0].center_world_mm.y() == -900.0);
+
+  const auto fault = [&](const std::string& piece, const std::string& replacement) {
+    std::string changed = text + more;
+    changed.replace(changed.find(piece), piece.size(), replacement);
+    const auto read = read_scene(folder.write("scene.toml", changed));
+    REQUIRE_FALSE(read);
+    return read.error().message;
+  };
+  CHECK_THAT(fault("\"second\"", "\"middle\""), Catch::Contains("jaw.holds") && Catch::Contains("middle"));
+  CHECK_THAT(fault("1500.0]\n[[other", "2500.0]\n[[other"),
+             Catch::Contains("v_blocks.at_mm") && Catch::Contains("2500"));
+  CHECK_THAT(fault("\"flat\"", "\"square\""), Catch::Contains("other[0].shape") && Catch::Contains("square"));
+}
+
 TEST_CASE("scene file: faults of every kind name their place") {
   CHECK_THAT(fault_after("blur_sigma_px", "blur_sigma"), Catch::Contains("imaging.blur_sigma: unknown key"));
   CHECK_THAT(fault_after("kind = \"forge\"", "kind = \"foundry\""), Catch::Contains("foundry"));
