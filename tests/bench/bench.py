@@ -8,7 +8,11 @@ targets   the paper's target benchmark, recall and precision beside OpenCV's ArU
 centers   the spread of rendered targets' centres beside the bound, their bias, the stated sigma; only when asked for.
 calibration  tables 3 to 5 and figure 9 of paper B on rendered frames, and 200 repetitions; only when asked for.
 survey    60 rendered photographs of a target field, surveyed and held against the truth; only when asked for.
+edges     single points of clean straight rims beside the bound, all methods; status 1 when it is missed; only when asked for.
+segmentation  300 frames with a forging and 200 empty halls: found, said to have failed, wrong; only when asked for.
+          Takes --frames N --halls N --first I --seed S --only KIND --save DIR.
 silhouettes  tables 2 to 7 of paper C on rendered scenes, all seven methods; only when asked for.
+          Takes --only NAME --seed S --of N --keep DIR.
 clutter   200 frames of 4 megapixels without targets: what is claimed to be one; only when asked for.
 """
 import argparse
@@ -86,18 +90,21 @@ def print_row(scene, observations, seed, values):
 
 def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    papers = {"targets": "targets", "clutter": "targets", "centers": "targets", "calibration": "calibration", "survey": "survey"}
-    parser.add_argument("name", nargs="?", choices=["stages", "latency", "accuracy", "silhouettes", *papers], help="default: the first three")
+    papers = {"targets": "targets", "clutter": "targets", "centers": "targets", "calibration": "calibration", "survey": "survey",
+              "edges": "silhouettes", "segmentation": "silhouettes", "silhouettes": None}
+    parser.add_argument("name", nargs="?", choices=["stages", "latency", "accuracy", *papers], help="default: the first three")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=101)
     parser.add_argument("--observations", type=int, default=100, help="of latency")
-    options = parser.parse_args()
+    options, rest = parser.parse_known_args()
+    if rest and options.name not in papers:
+        parser.error(f"unknown: {' '.join(rest)}")
     if options.name == "silhouettes":
         tables = ROOT / "tests" / "paper" / "silhouettes" / "tables.py"
-        sys.exit(subprocess.run([sys.executable, tables, "--programs", BUILD], check=False).returncode)
+        sys.exit(subprocess.run([sys.executable, tables, "--programs", BUILD, *rest], check=False).returncode)
     if options.name in papers:
         bench = BUILD / "tests" / "paper" / papers[options.name] / f"{options.name}_bench"
-        sys.exit(subprocess.run([bench], check=False).returncode)
+        sys.exit(subprocess.run([bench, *rest], check=False).returncode)
     for name, bench in (("stages", bench_stages), ("latency", bench_latency), ("accuracy", bench_accuracy)):
         if options.name in (None, name):
             print(f"== {name}")

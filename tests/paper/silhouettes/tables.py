@@ -142,8 +142,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build", help="the build folder")
     parser.add_argument("--only", choices=list(TITLES))
-    parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--observations", type=int, help="of each forging; default: as in the paper")
+    parser.add_argument("--seed", type=int, default=1, help="the first")
+    parser.add_argument("--of", type=int, dest="observations", help="observations of each forging; default: as in the paper")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the rendered scenes, used again where they are there")
     options = parser.parse_args()
     bench = options.programs / "tests" / "paper" / "silhouettes" / "silhouettes_bench"
@@ -152,7 +152,7 @@ def main():
         folder = options.keep or pathlib.Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
         for kind in [options.only] if options.only else list(TITLES):
-            seeds = range(options.first_seed, options.first_seed + (3 if kind == "laboratory" else 1))
+            seeds = range(options.seed, options.seed + (3 if kind == "laboratory" else 1))
             count = options.observations or {"laboratory": 20, "forge": 10}.get(kind, 12)  # as [C], table 1
             measured = json.loads(run([bench, *render(options.programs, kind, folder, seeds, count)]))
             print_table(kind, measured)
