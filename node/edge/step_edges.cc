@@ -9,12 +9,18 @@
 namespace imprint {
 namespace {
 
+// What is read beyond the reach of the blur, since noise is the greater evil there.
+double spare_px(double noise_share) {
+  constexpr double kLittleNoise = 0.02, kMuchNoise = 0.028, kMostSpare = 3.0;
+  return kMostSpare * std::clamp((noise_share - kLittleNoise) / (kMuchNoise - kLittleNoise), 0.0, 1.0);
+}
+
 // The samples a step is fitted to: about the edge, out to where the blur has died away, and nothing of its neighbours.
 struct Window {
   int from = 0, count = 0;
 };
-Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur, double spare_px) {
-  const int reach = std::clamp(static_cast<int>(std::ceil(2.5 * blur + 1.5 + spare_px)), 3, 12);
+Window fit_window(const ScanLine& line, const TracedEdge& traced, double blur, double noise_share) {
+  const int reach = fit_reach_px(blur, noise_share);
   const int middle = static_cast<int>(std::lround(traced.edge.position_px - line.first_px));
   const int from = std::max({0, middle - reach, std::min(traced.edge.from_sample, middle - 2)});
   const int to = std::min({line.count - 1, middle + reach, std::max(traced.edge.to_sample, middle + 2)});
@@ -115,6 +121,10 @@ std::vector<EdgeShape> regional_shapes(const ScanLines& scan, const std::vector<
 
 }  // namespace
 
+int fit_reach_px(double blur_px, double noise_share) {
+  return std::clamp(static_cast<int>(std::ceil(2.5 * blur_px + 1.5 + spare_px(noise_share))), 3, 12);
+}
+
 namespace {
 
 struct StepFits {
@@ -122,13 +132,13 @@ struct StepFits {
   std::vector<FittedLine> lines;  // of the edges, in their order
 };
 
-// Steps of known shapes fitted to `spare_px` more on either side than the blur needs.
+// Steps of known shapes fitted in windows for that noise.
 StepFits fit_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced, const std::vector<EdgeShape>& shapes,
-                    double spare_px) {
+                    double noise_share) {
   StepFits fits;
   for (std::size_t i = 0; i < traced.size(); ++i) {
     const ScanLine& line = scan.lines[traced[i].line];
-    const Window window = fit_window(line, traced[i], shapes[i].blur, spare_px);
+    const Window window = fit_window(line, traced[i], shapes[i].blur, noise_share);
     const auto fit = fit_step(scan.samples(line) + window.from, window.count,
                               traced[i].edge.position_px - line.first_px - window.from, shapes[i]);
     if (!fit) continue;
@@ -139,7 +149,7 @@ StepFits fit_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced
 }
 
 // The usual noise of a grey value, share of the step.
-double noise_share(const std::vector<FittedLine>& lines) {
+double usual_noise(const std::vector<FittedLine>& lines) {
   std::vector<double> shares;
   for (const FittedLine& line : lines) shares.push_back(line.fit.residual / line.fit.step);
   return shares.empty() ? 0.0 : median(shares);
@@ -149,17 +159,12 @@ double noise_share(const std::vector<FittedLine>& lines) {
 
 std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
   constexpr int kSlopeLines = 14;
-  constexpr double kLittleNoise = 0.02, kMuchNoise = 0.028, kMostSpare = 3.0;
   if (traced.empty()) return {};
   const std::vector<EdgeShape> shapes =
       regional_shapes(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
-  // The farther from the edge, the less does a level hold; where noise is the greater evil, more of it is read.
   StepFits fits = fit_shapes(scan, traced, shapes, 0.0);
-  const double noise = noise_share(fits.lines);
-
-  if (noise > kLittleNoise)
-    fits = fit_shapes(scan, traced, shapes,
-                      kMostSpare * std::min(1.0, (noise - kLittleNoise) / (kMuchNoise - kLittleNoise)));
+  if (const double noise = usual_noise(fits.lines); spare_px(noise) > 0.0)
+    fits = fit_shapes(scan, traced, shapes, noise);
   std::vector<StepEdge>& edges = fits.edges;
   if (edges.empty()) return {};
   const std::vector<double> shifts = shifts_by_slopes(fits.lines, kSlopeLines);

@@ -15,6 +15,10 @@ struct StepEdge {
   double blur_px = 1.0;  ///< standard deviation, where it was fitted
 };
 
+/// How far to either side of a traced edge a step of that blur (px) is fitted, where no other edge is nearer. The
+/// farther from the edge, the less does a level hold; where noise (share of the step) is the greater evil, more is read.
+int fit_reach_px(double blur_px, double noise_share);
+
 /// Blurred steps fitted to the traced edges. The blur is first fitted freely on a part of the lines, its median taken
 /// per `region_lines` lines, then kept: one unknown less for each line. Edges that no step fits are left out.
 std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines);
