@@ -66,6 +66,17 @@ Result<void> draw(const cv::Mat& image, const FilteredSilhouette& silhouette, co
   return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
+nlohmann::json quality_json(const FrameQuality& quality) {
+  return {{"edge_points", quality.edge_points},
+          {"edge_coverage", quality.edge_coverage},
+          {"contrast", quality.contrast},
+          {"saturated_fraction", quality.saturated_fraction},
+          {"frame_saturated_fraction", quality.frame_saturated_fraction},
+          {"body_level", quality.body_level},
+          {"blur_px", quality.blur_px},
+          {"haze_px", quality.haze_px}};
+}
+
 int run_edges(const EdgesOptions& options, bool as_json) {
   const auto method = edge_method_from_name(options.method);
   if (!method) return fail(method.error());
@@ -89,20 +100,21 @@ int run_edges(const EdgesOptions& options, bool as_json) {
   }
   if (processed.error) return fail(*processed.error);
   const FilteredSilhouette& silhouette = *processed.silhouette;
+  const FrameQuality& quality = processed.imprint.quality;
   if (as_json) {
     return print_json({{"camera", camera->id},
+                       {"quality", quality_json(quality)},
                        {"upper", curve_json(silhouette.frame, silhouette.upper)},
                        {"lower", curve_json(silhouette.frame, silhouette.lower)},
                        {"axis", curve_json(silhouette.frame, silhouette.axis)},
                        {"start", end_json(silhouette.frame, silhouette.start)},
                        {"end", end_json(silhouette.frame, silhouette.end)}});
   }
-  const FrameQuality& quality = processed.imprint.quality;
   fmt::print(
       "camera \"{}\": {} edge points, both rims trusted over {:.0f} % of the length, contrast {:.0f} % of full scale, "
-      "{:.1f} % saturated\n",
+      "{:.1f} % saturated, blur {:.2f} px, haze {:.2f} px\n",
       camera->id, quality.edge_points, 100 * quality.edge_coverage, 100 * quality.contrast,
-      100 * quality.saturated_fraction);
+      100 * quality.saturated_fraction, quality.blur_px, quality.haze_px);
   for (const auto& [name, end] : {std::pair{"start", silhouette.start}, {"end", silhouette.end}}) {
     const ObservedPoint p = observed(silhouette.frame, end.station_px, end.offset_px);
     if (end.visible) fmt::print("  {:<5} at ({:.2f}, {:.2f}) px +-{:.2f}\n", name, p.x_px, p.y_px, 1.96 * end.sigma_px);

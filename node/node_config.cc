@@ -17,13 +17,42 @@ constexpr auto kSources = [] {
   return sources;
 }();
 
+ExposureConfig read_exposure(TomlReader& read) {
+  ExposureConfig config;
+  config.automatic = read.boolean("exposure.auto", config.automatic);
+  config.min_time_us = read.number("exposure.min_us", config.min_time_us);
+  config.max_time_us = read.number("exposure.max_us", config.max_time_us);
+  config.max_gain_db = read.number("exposure.max_gain_db", config.max_gain_db);
+  config.target_level = read.number("exposure.target_level", config.target_level);
+  config.max_step = read.number("exposure.max_step", config.max_step);
+  if (const auto valid = config.validate(); !valid) read.fault("exposure", valid.error().message);
+  return config;
+}
+
 }  // namespace
 
 Result<NodeConfig> read_node_config(const std::filesystem::path& path, const toml::table& table) {
   NodeConfig config;
   TomlReader read(path, table);
-  read.only({"node.site", "node.line", "node.camera_id", "node.rig", "node.method", "node.log_level", "capture.source",
-             "capture.path", "zenoh.connect", "zenoh.listen", "health.period_s", "node.data_dir", "spool.max_mb",
+  read.only({"node.site",
+             "node.line",
+             "node.camera_id",
+             "node.rig",
+             "node.method",
+             "node.log_level",
+             "capture.source",
+             "capture.path",
+             "exposure.auto",
+             "exposure.min_us",
+             "exposure.max_us",
+             "exposure.max_gain_db",
+             "exposure.target_level",
+             "exposure.max_step",
+             "zenoh.connect",
+             "zenoh.listen",
+             "health.period_s",
+             "node.data_dir",
+             "spool.max_mb",
              "spool.retry_s"});
   config.site = read_id(read, "node.site", config.site);
   config.line = read_id(read, "node.line", config.line);
@@ -33,6 +62,7 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
   config.log_level = read_choice(read, "node.log_level", kLogLevels, config.log_level);
   config.capture_source = read_choice(read, "capture.source", kSources, std::nullopt);
   config.capture_path = read.path("capture.path");
+  config.exposure = read_exposure(read);
   config.zenoh = read_zenoh_section(read, config.zenoh);
   config.health_period_s = read.number("health.period_s", config.health_period_s);
   if (!(config.health_period_s >= 0.1 && config.health_period_s <= 3600.0)) {
@@ -57,12 +87,16 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
 std::string to_toml(const NodeConfig& config) {
   return fmt::format(
       "[node]\nsite = {}\nline = {}\ncamera_id = {}\nrig = {}\nmethod = {}\nlog_level = {}\n"
-      "data_dir = {}\n\n[spool]\nmax_mb = {}\nretry_s = {}\n\n[capture]\nsource = {}\npath = {}\n\n[zenoh]\nconnect = "
-      "{}\nlisten = {}\n\n[health]\nperiod_s = {}\n",
+      "data_dir = {}\n\n[spool]\nmax_mb = {}\nretry_s = {}\n\n[capture]\nsource = {}\npath = {}\n\n"
+      "[exposure]\nauto = {}\nmin_us = {}\nmax_us = {}\nmax_gain_db = {}\ntarget_level = {}\nmax_step = {}\n\n"
+      "[zenoh]\nconnect = {}\nlisten = {}\n\n[health]\nperiod_s = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.camera_id), toml_text(config.rig.string()),
       toml_text(config.method), toml_text(config.log_level), toml_text(config.data_dir.string()), config.spool_max_mb,
       toml_number(config.retry_s), toml_text(config.capture_source), toml_text(config.capture_path.string()),
-      toml_list(config.zenoh.connect), toml_list(config.zenoh.listen), toml_number(config.health_period_s));
+      config.exposure.automatic, toml_number(config.exposure.min_time_us), toml_number(config.exposure.max_time_us),
+      toml_number(config.exposure.max_gain_db), toml_number(config.exposure.target_level),
+      toml_number(config.exposure.max_step), toml_list(config.zenoh.connect), toml_list(config.zenoh.listen),
+      toml_number(config.health_period_s));
 }
 
 }  // namespace imprint

@@ -7,6 +7,7 @@
 #include "lib/config/toml_file.h"
 #include "lib/result/result.h"
 #include "lib/transport/transport.h"
+#include "node/capture/exposure_control.h"
 
 namespace imprint {
 
@@ -20,6 +21,7 @@ struct NodeConfig {
   std::string log_level = "info";
   std::string capture_source;          // folder, session, simulation or imprints
   std::filesystem::path capture_path;  // the folder, the session.toml or the scene
+  ExposureConfig exposure;
   ZenohConfig zenoh{.connect = {"tcp/127.0.0.1:7447"}, .listen = {}, .router = false};
   double health_period_s = 5.0;
   std::filesystem::path data_dir;   // imprints wait below it for fusion's receipt; empty: in memory alone

@@ -4,7 +4,9 @@
 
 #include "node/detect/detect_config.h"
 #include "node/edge/edge_config.h"
+#include "node/edge/frame_measures.h"
 #include "node/imprint/filter_config.h"
+#include "node/imprint/trusted_rims.h"
 #include "node/pose/hot_air.h"
 #include "node/segment/segment_config.h"
 #include "node/segment/segment_prior.h"
@@ -81,10 +83,24 @@ Result<Resection> resect_in_hot_air(const CameraModel& camera, const Rig& rig, R
   return again ? std::move(again) : std::move(first);
 }
 
+// Above this share the 99.5 percentile saturates, and with it rims here and there: a clipped edge stands too far out.
+constexpr double kSaturated = 0.005;
+
+void note_measures(const FrameMeasures& measures, Imprint& imprint) {
+  imprint.quality.blur_px = measures.blur_px;
+  imprint.quality.haze_px = measures.haze_px;
+  imprint.quality.body_level = measures.body_level;
+  imprint.quality.frame_saturated_fraction = measures.frame_saturated_fraction;
+}
+
 void note_silhouette(const Silhouette& silhouette, Imprint& imprint) {
   imprint.quality.edge_points = static_cast<int>(silhouette.upper.size() + silhouette.lower.size());
   imprint.quality.contrast = silhouette.contrast;
   imprint.quality.saturated_fraction = silhouette.saturated_fraction;
+  if (silhouette.saturated_fraction > kSaturated)
+    imprint.warnings.push_back(
+        fmt::format("camera \"{}\": {:.1f} % of the forging is saturated, rims may stand too far out: expose less",
+                    imprint.camera_id, 100.0 * silhouette.saturated_fraction));
 }
 
 void note_coverage(Imprint& imprint) {
@@ -149,6 +165,13 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
     result.silhouette = std::move(*filtered);
     return fill_curves(*result.silhouette, camera, imprint);
   });
+  note_measures(timed(result, "measure",
+                      [&] {
+                        const Silhouette rims =
+                            result.silhouette ? trusted_rims(silhouette, *result.silhouette) : silhouette;
+                        return measure_frame(frame.image, rims, rig.forging.polarity);
+                      }),
+                imprint);
   if (!filled) {
     return give_up(result, {filled.error().kind,
                             fmt::format("{}: camera \"{}\": {}", frame.source, camera.id, filled.error().message)});

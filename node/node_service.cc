@@ -5,6 +5,7 @@
 #include "lib/clock/wall_clock.h"
 #include "lib/log/log.h"
 #include "lib/wire/keys.h"
+#include "node/capture/exposure_control.h"
 
 namespace imprint {
 namespace {
@@ -151,6 +152,7 @@ Imprint NodeService::make_imprint(const Trigger& trigger) {
       imprint = std::move(processed.imprint);
       if (processed.error && imprint.failure.empty()) imprint.failure = processed.error->message;
       imprint.warnings.insert(imprint.warnings.end(), frame->warnings.begin(), frame->warnings.end());
+      control_exposure(*frame, imprint);
     } else {
       imprint.failure = frame.error().message;
     }
@@ -167,6 +169,32 @@ Imprint NodeService::make_imprint(const Trigger& trigger) {
   return imprint;
 }
 
+void NodeService::control_exposure(const Frame& frame, Imprint& imprint) {
+  const BodyLight light{imprint.quality.body_level, imprint.quality.saturated_fraction};
+  AdjustableExposure* camera = config_.exposure.automatic ? source_.adjustable_exposure() : nullptr;
+  std::string alarm;
+  if (camera != nullptr) {
+    const ExposureDecision decision = next_exposure(config_.exposure, frame.exposure, light);
+    alarm = decision.alarm;
+    if (decision.changed) {
+      const auto set = camera->set_exposure(decision.next);
+      if (!set) alarm = set.error().message;
+      if (set) spdlog::info("exposure {:.4g} us, {:.1f} dB from now on", decision.next.time_us, decision.next.gain_db);
+    }
+  } else if (is_saturated(light)) {
+    alarm = fmt::format(
+        "cannot hold the body out of saturation: {}",
+        config_.exposure.automatic ? "the exposure of this frame source cannot be set" : "exposure.auto is off");
+  }
+  if (!alarm.empty())  // first: only three warnings are sure to be sent
+    imprint.warnings.insert(imprint.warnings.begin(), fmt::format("camera \"{}\": {}", config_.camera_id, alarm));
+  const std::lock_guard lock(publish_mutex_);
+  if (alarm != health_.exposure_alarm && !alarm.empty()) spdlog::error("{}", alarm);
+  health_.exposure_alarm = alarm;
+  health_.exposure_us = frame.exposure.time_us;
+  health_.gain_db = frame.exposure.gain_db;
+}
+
 void NodeService::note(const Imprint& imprint) {
   courier_->send(imprint);
   {
@@ -177,6 +205,10 @@ void NodeService::note(const Imprint& imprint) {
     health_.targets_seen = imprint.quality.targets_seen;
     health_.reprojection_rms_px = imprint.quality.reprojection_rms_px;
     health_.contrast = imprint.quality.contrast;
+    health_.saturated_fraction = imprint.quality.saturated_fraction;
+    health_.body_level = imprint.quality.body_level;
+    health_.blur_px = imprint.quality.blur_px;
+    health_.haze_px = imprint.quality.haze_px;
     health_.pose_state = imprint.pose_state;
   }
   if (imprint.failure.empty()) {

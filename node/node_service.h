@@ -57,6 +57,8 @@ class NodeService {
   /// Waits for the trigger's moment, which is by fusion's clock; false when the node is stopped meanwhile.
   bool await(const Trigger& trigger, std::vector<std::string>& warnings);
   Imprint make_imprint(const Trigger& trigger);
+  /// Sets the exposure of the next frame by what this one showed, and says where that is not possible.
+  void control_exposure(const Frame& frame, Imprint& imprint);
   void note(const Imprint& imprint);
 
   NodeConfig config_;

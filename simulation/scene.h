@@ -63,6 +63,7 @@ struct ImagingScene {
   double read_noise_e = 4.0;
   double noise = 1.0;       ///< factor of shot and read noise; 0: none
   double vignetting = 0.2;  ///< loss at the corner
+  double exposure = 1.0;    ///< light that is collected, against what the levels of the scene mean
 };
 
 struct TargetScene {

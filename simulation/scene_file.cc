@@ -104,9 +104,9 @@ SurfaceScene read_surface(TomlReader& read, const toml::table& table) {
 }
 
 ImagingScene read_imaging(TomlReader& read, const toml::table& table) {
-  know_keys(
-      read, table, "imaging",
-      {"bits", "blur_sigma_px", "haze_rms_px", "haze_grid_px", "full_well_e", "read_noise_e", "noise", "vignetting"});
+  know_keys(read, table, "imaging",
+            {"bits", "blur_sigma_px", "haze_rms_px", "haze_grid_px", "full_well_e", "read_noise_e", "noise",
+             "vignetting", "exposure"});
   ImagingScene i;
   i.bits = whole(read, "imaging.bits", i.bits, 8, 16);
   if (i.bits != 8 && i.bits != 16) read.fault("imaging.bits", fmt::format("expected 8 or 16, found {}", i.bits));
@@ -117,6 +117,7 @@ ImagingScene read_imaging(TomlReader& read, const toml::table& table) {
   i.read_noise_e = within(read, "imaging.read_noise_e", i.read_noise_e, 0.0, 1000.0);
   i.noise = within(read, "imaging.noise", i.noise, 0.0, 20.0);
   i.vignetting = within(read, "imaging.vignetting", i.vignetting, 0.0, 0.9);
+  i.exposure = within(read, "imaging.exposure", i.exposure, 1e-3, 1e3);
   return i;
 }
 

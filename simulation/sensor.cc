@@ -59,6 +59,7 @@ void expose_rows(const ImagingScene& imaging, std::uint64_t seed, const cv::Mat&
   }
   const auto read2 =
       static_cast<float>(imaging.read_noise_e * imaging.read_noise_e / (imaging.full_well_e * imaging.full_well_e));
+  const auto exposure = static_cast<float>(imaging.exposure);
   const auto shot = static_cast<float>(1.0 / imaging.full_well_e), strength = static_cast<float>(imaging.noise);
   for (int y = 0; y < light.rows; ++y) {
     const double from_center = y - 0.5 * (light.rows - 1);
@@ -67,7 +68,7 @@ void expose_rows(const ImagingScene& imaging, std::uint64_t seed, const cv::Mat&
     const float* in = light.ptr<float>(y);
     auto* out = image.ptr<Pixel>(y);
     for (int x = 0; x < light.cols; ++x) {
-      const float mean = std::max(0.0F, in[x] * (base - across[static_cast<std::size_t>(x)]));
+      const float mean = std::max(0.0F, exposure * in[x] * (base - across[static_cast<std::size_t>(x)]));
       const float value = mean + strength * std::sqrt(mean * shot + read2) * normal[static_cast<std::size_t>(x)];
       out[x] = static_cast<Pixel>(std::min(std::max(value, 0.0F), 1.0F) * full_scale + 0.5F);
     }

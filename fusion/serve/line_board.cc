@@ -29,6 +29,13 @@ json health_json(const Health& health, double age) {
           {"targets_seen", health.targets_seen},
           {"reprojection_rms_px", health.reprojection_rms_px},
           {"contrast", health.contrast},
+          {"saturated_fraction", health.saturated_fraction},
+          {"body_level", health.body_level},
+          {"blur_px", health.blur_px},
+          {"haze_px", health.haze_px},
+          {"exposure_us", health.exposure_us},
+          {"gain_db", health.gain_db},
+          {"exposure_alarm", health.exposure_alarm},
           {"pose_state", pose_state_name(health.pose_state)},
           {"last_error", health.last_error},
           {"version", health.version}};
@@ -55,7 +62,12 @@ json imprint_json(const Imprint& imprint, double age) {
           {"targets_used", imprint.quality.targets_used},
           {"reprojection_rms_px", imprint.quality.reprojection_rms_px},
           {"edge_coverage", imprint.quality.edge_coverage},
+          {"contrast", imprint.quality.contrast},
           {"saturated_fraction", imprint.quality.saturated_fraction},
+          {"frame_saturated_fraction", imprint.quality.frame_saturated_fraction},
+          {"body_level", imprint.quality.body_level},
+          {"blur_px", imprint.quality.blur_px},
+          {"haze_px", imprint.quality.haze_px},
           {"method", imprint.method},
           {"pose_state", pose_state_name(imprint.pose_state)},
           {"pose_doubtful", imprint.pose_doubtful},
@@ -107,6 +119,12 @@ std::optional<std::string> LineBoard::set_health(const Health& health, Time now)
   const auto camera = cameras_.find(health.camera_id);
   if (camera == cameras_.end()) return std::nullopt;
   auto raised = watch_for_namesakes(camera->second, health, now);
+  const std::string exposure = "exposure_" + health.camera_id;
+  if (health.exposure_alarm.empty()) {
+    alarms_.erase(exposure);
+  } else {
+    alarms_[exposure] = fmt::format("camera {}: {}", health.camera_id, health.exposure_alarm);
+  }
   camera->second.health = health;
   camera->second.health_at = now;
   return raised;

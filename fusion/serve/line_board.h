@@ -47,7 +47,7 @@ class LineBoard {
   void set_alive(const std::string& camera_id, bool alive);
   /// Two nodes that send under one camera's name make the alarm `two_nodes_<camera>`: a boot id that comes back after
   /// another one was heard is no restart. It ends when only one has been heard for two minutes. Gives the text of the
-  /// alarm when this record has raised it, else nothing.
+  /// alarm when this record has raised it, else nothing. The alarm `exposure_<camera>` is the one of its last record.
   std::optional<std::string> set_health(const Health& health, Time now);
   void note_imprint(const Imprint& imprint, Time now);
   /// What a camera's node holds that fusion has not confirmed.

@@ -46,10 +46,14 @@ struct FrameQuality {
   int targets_seen = 0;
   int targets_used = 0;
   double reprojection_rms_px = 0.0;
-  int edge_points = 0;              ///< edge points found before filtering, both rims
-  double edge_coverage = 0.0;       ///< share of the stations with both rims trusted, 0 to 1
-  double contrast = 0.0;            ///< median step across the rims, share of full scale
-  double saturated_fraction = 0.0;  ///< share of saturated pixels inside the forging
+  int edge_points = 0;                    ///< edge points found before filtering, both rims
+  double edge_coverage = 0.0;             ///< share of the stations with both rims trusted, 0 to 1
+  double contrast = 0.0;                  ///< median step across the rims, share of full scale
+  double saturated_fraction = 0.0;        ///< share of saturated pixels inside the forging
+  double frame_saturated_fraction = 0.0;  ///< and in the whole frame, lamps and all
+  double body_level = 0.0;  ///< 99.5 percentile of the forging (dark: of its surroundings), share of full scale
+  double blur_px = 0.0;     ///< standard deviation of the blur across the rims, pixel area left out; 0: unknown
+  double haze_px = 0.0;     ///< edge jitter beyond the noise: hot air, RMS along a fifth of the diameter
 };
 
 /// Number of stations of a curve, [D] 2.1.2.

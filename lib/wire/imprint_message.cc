@@ -111,6 +111,10 @@ void fill_quality(v1::FrameQuality& message, const FrameQuality& quality) {
   message.set_edge_coverage(wire_float(quality.edge_coverage));
   message.set_contrast(wire_float(quality.contrast));
   message.set_saturated_fraction(wire_float(quality.saturated_fraction));
+  message.set_blur_px(wire_float(quality.blur_px));
+  message.set_haze_px(wire_float(quality.haze_px));
+  message.set_body_level(wire_float(quality.body_level));
+  message.set_frame_saturated_fraction(wire_float(quality.frame_saturated_fraction));
 }
 
 void fill_warnings(v1::Imprint& message, const std::vector<std::string>& warnings, const CurveEconomy& economy) {
@@ -176,7 +180,12 @@ Result<FrameQuality> read_quality(const v1::FrameQuality& message) {
   quality.edge_coverage = message.edge_coverage();
   quality.contrast = message.contrast();
   quality.saturated_fraction = message.saturated_fraction();
-  if (!all_finite(quality.reprojection_rms_px, quality.edge_coverage, quality.contrast, quality.saturated_fraction))
+  quality.blur_px = message.blur_px();
+  quality.haze_px = message.haze_px();
+  quality.body_level = message.body_level();
+  quality.frame_saturated_fraction = message.frame_saturated_fraction();
+  if (!all_finite(quality.reprojection_rms_px, quality.edge_coverage, quality.contrast, quality.saturated_fraction,
+                  quality.blur_px, quality.haze_px, quality.body_level, quality.frame_saturated_fraction))
     return invalid_input("quality: expected finite values");
   return quality;
 }

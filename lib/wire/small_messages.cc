@@ -18,6 +18,7 @@ constexpr std::uint32_t kSchemaVersion = 1;
 constexpr std::size_t kMaxSmallBytes = 4096;
 constexpr std::size_t kMaxResultBytes = std::size_t{16} << 20;  // 500 sections take about 0.15 MB
 constexpr std::size_t kMaxErrorBytes = 80;
+constexpr std::size_t kMaxAlarmBytes = 120;
 constexpr std::size_t kMaxVersionBytes = 32;
 constexpr std::size_t kMaxResultErrorBytes = 1000;
 
@@ -64,6 +65,13 @@ std::vector<std::uint8_t> encode_health(const Health& health) {
   message.set_last_error(wire_line(health.last_error, kMaxErrorBytes));
   message.set_version(wire_line(health.version, kMaxVersionBytes));
   message.set_pose_state(static_cast<std::uint32_t>(health.pose_state));
+  message.set_saturated_fraction(wire_float(health.saturated_fraction));
+  message.set_blur_px(wire_float(health.blur_px));
+  message.set_haze_px(wire_float(health.haze_px));
+  message.set_body_level(wire_float(health.body_level));
+  message.set_exposure_us(wire_float(health.exposure_us));
+  message.set_gain_db(wire_float(health.gain_db));
+  message.set_exposure_alarm(wire_line(health.exposure_alarm, kMaxAlarmBytes));
   return bytes_of(message);
 }
 
@@ -72,8 +80,11 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes) {
   if (!message) return invalid_input("health: {}", message.error().message);
   if (auto checked = check_id("camera", message->camera_id()); !checked)
     return invalid_input("health: {}", checked.error().message);
-  if (!std::isfinite(message->reprojection_rms_px()) || !std::isfinite(message->contrast()))
-    return invalid_input("health of camera '{}': expected finite values", message->camera_id());
+  for (const float value :
+       {message->reprojection_rms_px(), message->contrast(), message->saturated_fraction(), message->blur_px(),
+        message->haze_px(), message->body_level(), message->exposure_us(), message->gain_db()})
+    if (!std::isfinite(value))
+      return invalid_input("health of camera '{}': expected finite values", message->camera_id());
   Health health;
   health.camera_id = message->camera_id();
   health.time_ns = message->time_ns();
@@ -87,6 +98,13 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes) {
   health.last_error = message->last_error();
   health.version = message->version();
   health.pose_state = pose_state_from(static_cast<int>(std::min(message->pose_state(), 3U)));
+  health.saturated_fraction = message->saturated_fraction();
+  health.blur_px = message->blur_px();
+  health.haze_px = message->haze_px();
+  health.body_level = message->body_level();
+  health.exposure_us = message->exposure_us();
+  health.gain_db = message->gain_db();
+  health.exposure_alarm = message->exposure_alarm();
   return health;
 }
 

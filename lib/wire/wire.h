@@ -50,6 +50,14 @@ struct Health {
   std::string last_error;  ///< one line, cut to 80 bytes; empty when the last frame was good
   std::string version;
   PoseState pose_state = PoseState::tracking;  ///< of the last frame
+  // Of the last frame, as in FrameQuality.
+  double saturated_fraction = 0.0;
+  double blur_px = 0.0;
+  double haze_px = 0.0;
+  double body_level = 0.0;
+  double exposure_us = 0.0;  ///< 0: the frame source does not say
+  double gain_db = 0.0;
+  std::string exposure_alarm{};  ///< one line, cut to 120 bytes; empty: the forging is held out of saturation
 };
 std::vector<std::uint8_t> encode_health(const Health& health);
 Result<Health> decode_health(std::span<const std::uint8_t> bytes);

@@ -6,6 +6,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "node/capture/exposure.h"
+
 namespace imprint {
 
 /// One picture of one camera: one channel, 8 or 16 bit.
@@ -15,6 +17,7 @@ struct Frame {
   std::int64_t sensor_time_ns = 0;
   std::uint64_t sequence = 0;
   std::vector<std::string> warnings{};  ///< what the capture noticed, for the imprint
+  Exposure exposure{};                  ///< it was taken with, where the source knows
 };
 
 }  // namespace imprint

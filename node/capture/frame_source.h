@@ -24,6 +24,8 @@ class FrameSource {
   virtual ~FrameSource() = default;
   /// One frame, taken now. Fails (job_failed or invalid_input) naming the device or the file; may be called again.
   virtual Result<Frame> capture(const CaptureRequest& request) = 0;
+  /// Nothing when its exposure cannot be set, as that of pictures already taken.
+  [[nodiscard]] virtual AdjustableExposure* adjustable_exposure() { return nullptr; }
 };
 
 inline constexpr auto kFrameSources = std::to_array<std::string_view>({"folder", "session", "simulation"});

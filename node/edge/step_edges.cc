@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "node/edge/level_slopes.h"
-#include "node/edge/subpixel.h"
 
 namespace imprint {
 namespace {
@@ -100,15 +99,10 @@ EdgeShape shape_of(const ScanLines& scan, const std::vector<TracedEdge>& traced,
 
 // The shape at every traced edge: that of its region, on the line between the regions' middles, so that no step comes
 // from where they meet.
-std::vector<EdgeShape> regional_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced,
+std::vector<EdgeShape> shapes_at_edges(const std::vector<EdgeShape>& regions, std::size_t edges,
                                        std::size_t region_lines) {
-  const std::vector<double> blur = regional_blur(scan, traced, region_lines);
-  std::vector<EdgeShape> regions;
-  for (std::size_t r = 0; r < blur.size(); ++r)
-    regions.push_back(
-        shape_of(scan, traced, r * region_lines, std::min(traced.size(), (r + 1) * region_lines), blur[r]));
-  std::vector<EdgeShape> shapes(traced.size());
-  for (std::size_t i = 0; i < traced.size(); ++i) {
+  std::vector<EdgeShape> shapes(edges);
+  for (std::size_t i = 0; i < edges; ++i) {
     const double place = std::clamp((static_cast<double>(i) + 0.5) / static_cast<double>(region_lines) - 0.5, 0.0,
                                     static_cast<double>(regions.size() - 1));
     const auto r = std::min(static_cast<std::size_t>(place), regions.size() - 1);
@@ -123,6 +117,16 @@ std::vector<EdgeShape> regional_shapes(const ScanLines& scan, const std::vector<
 
 int fit_reach_px(double blur_px, double noise_share) {
   return std::clamp(static_cast<int>(std::ceil(2.5 * blur_px + 1.5 + spare_px(noise_share))), 3, 12);
+}
+
+std::vector<EdgeShape> region_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced,
+                                     std::size_t region_lines) {
+  const std::vector<double> blur = regional_blur(scan, traced, region_lines);
+  std::vector<EdgeShape> regions;
+  for (std::size_t r = 0; r < blur.size(); ++r)
+    regions.push_back(
+        shape_of(scan, traced, r * region_lines, std::min(traced.size(), (r + 1) * region_lines), blur[r]));
+  return regions;
 }
 
 namespace {
@@ -160,8 +164,8 @@ double usual_noise(const std::vector<FittedLine>& lines) {
 std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
   constexpr int kSlopeLines = 14;
   if (traced.empty()) return {};
-  const std::vector<EdgeShape> shapes =
-      regional_shapes(scan, traced, static_cast<std::size_t>(std::max(16, region_lines)));
+  const auto lines = static_cast<std::size_t>(std::max(16, region_lines));
+  const std::vector<EdgeShape> shapes = shapes_at_edges(region_shapes(scan, traced, lines), traced.size(), lines);
   StepFits fits = fit_shapes(scan, traced, shapes, 0.0);
   if (const double noise = usual_noise(fits.lines); spare_px(noise) > 0.0)
     fits = fit_shapes(scan, traced, shapes, noise);

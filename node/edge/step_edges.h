@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "node/edge/edge_path.h"
+#include "node/edge/subpixel.h"
 
 namespace imprint {
 
@@ -18,6 +19,10 @@ struct StepEdge {
 /// How far to either side of a traced edge a step of that blur (px) is fitted, where no other edge is nearer. The
 /// farther from the edge, the less does a level hold; where noise (share of the step) is the greater evil, more is read.
 int fit_reach_px(double blur_px, double noise_share);
+
+/// Blur and rise of every `region_lines` traced edges, in their order: medians over their lines.
+std::vector<EdgeShape> region_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced,
+                                     std::size_t region_lines);
 
 /// Blurred steps fitted to the traced edges. The blur is first fitted freely on a part of the lines, its median taken
 /// per `region_lines` lines, then kept: one unknown less for each line. Edges that no step fits are left out.

@@ -95,7 +95,8 @@ class LiveLineTest(unittest.TestCase):
     def test_simulated_cameras_give_what_their_pictures_give(self):
         with Line() as line:
             line.start_fusion()
-            line.start_nodes("cam1", "cam2", "cam3", capture__source='"simulation"', capture__path=f'"{SCENE}"')
+            line.start_nodes("cam1", "cam2", "cam3", capture__source='"simulation"', capture__path=f'"{SCENE}"',
+                             exposure__auto="false")
             line.wait_alive("cam1", "cam2", "cam3")
             for observation in range(len(rotations)):
                 result = line.trigger(observation, len(rotations))

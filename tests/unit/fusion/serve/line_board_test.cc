@@ -60,6 +60,24 @@ TEST_CASE("board: the last result is shown without its sections, so that the sta
 
 namespace {
 
+TEST_CASE("board: what a camera says of its exposure is an alarm until it no longer says so") {
+  LineBoard line({"plant", "L1", "best", "0.1.0"}, {"cam1", "cam2"}, kStart);
+  Health health;
+  health.camera_id = "cam1";
+  health.exposure_alarm = "cannot hold the body out of saturation: exposure at its minimum 20 us";
+  health.haze_px = 0.25;
+  line.set_health(health, kStart);
+  const auto status = line.status(kStart);
+  REQUIRE(status["alarms"].size() == 1);
+  REQUIRE(status["alarms"][0]["name"] == "exposure_cam1");
+  REQUIRE(status["alarms"][0]["text"] ==
+          "camera cam1: cannot hold the body out of saturation: exposure at its minimum 20 us");
+  REQUIRE(status["cameras"][0]["health"]["haze_px"] == 0.25);
+  health.exposure_alarm.clear();
+  line.set_health(health, kStart);
+  REQUIRE_FALSE(line.has_alarm());
+}
+
 Health health_of(std::uint64_t boot_id, std::int64_t sent_s) {
   Health health;
   health.camera_id = "cam1";

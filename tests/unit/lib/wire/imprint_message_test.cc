@@ -78,6 +78,10 @@ TEST_CASE("imprint message: every field comes back") {
   CHECK(got.quality.edge_coverage == Approx(sent.quality.edge_coverage).epsilon(1e-7));
   CHECK(got.quality.contrast == Approx(sent.quality.contrast).epsilon(1e-7));
   CHECK(got.quality.saturated_fraction == Approx(sent.quality.saturated_fraction).epsilon(1e-7));
+  CHECK(got.quality.frame_saturated_fraction == Approx(sent.quality.frame_saturated_fraction).epsilon(1e-7));
+  CHECK(got.quality.body_level == Approx(sent.quality.body_level).epsilon(1e-7));
+  CHECK(got.quality.blur_px == Approx(sent.quality.blur_px).epsilon(1e-7));
+  CHECK(got.quality.haze_px == Approx(sent.quality.haze_px).epsilon(1e-7));
   CHECK(got.method == sent.method);
   CHECK(got.warnings == sent.warnings);
   CHECK(got.failure.empty());

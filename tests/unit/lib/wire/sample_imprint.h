@@ -58,7 +58,7 @@ inline Imprint sample_imprint(std::mt19937& random, const CurveShape& shape = {}
   imprint.axis = sample_curve(random, shape, -2.0, stations);
   imprint.start = {-2098.3, -1.5, 0.07, true};
   imprint.end = {2087.1, 3.25, 0.11, false};
-  imprint.quality = {31, 28, 0.127, 8421, 0.93, 0.41, 0.002};
+  imprint.quality = {31, 28, 0.127, 8421, 0.93, 0.41, 0.002, 0.0004, 0.79, 0.83, 0.14};
   imprint.method = "best";
   imprint.warnings = {"targets 17, 33: partly hidden, left out", "scale at the rim between stations 120 and 140"};
   return imprint;

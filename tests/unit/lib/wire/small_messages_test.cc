@@ -27,22 +27,24 @@ TEST_CASE("trigger message: a session that cannot be a key is refused") {
   CHECK_FALSE(decode_trigger(encode_trigger({"a", 0, std::numeric_limits<double>::infinity(), 0, 0})));
 }
 
-TEST_CASE("health message: comes back whole in about 120 bytes") {
-  const Health sent{"cam2",
-                    1795370000123456789,
-                    0x123456789abcdef0,
-                    4711,
-                    4800,
-                    89,
-                    31,
-                    0.127,
-                    0.41,
-                    "frame 4800: 2 targets found, 4 needed",
-                    "0.1.0",
-                    imprint::PoseState::hold};
+TEST_CASE("health message: comes back whole in about 130 bytes") {
+  Health sent{"cam2",
+              1795370000123456789,
+              0x123456789abcdef0,
+              4711,
+              4800,
+              89,
+              31,
+              0.127,
+              0.41,
+              "frame 4800: 2 targets found, 4 needed",
+              "0.1.0",
+              imprint::PoseState::hold};
+  sent.saturated_fraction = 0.012, sent.blur_px = 0.84, sent.haze_px = 0.13, sent.body_level = 0.81;
+  sent.exposure_us = 740.0, sent.gain_db = 3.0;
   const auto bytes = encode_health(sent);
   WARN("health: " << bytes.size() << " bytes");
-  CHECK(bytes.size() <= 120);
+  CHECK(bytes.size() <= 135);
   const auto got = decode_health(bytes);
   REQUIRE(got);
   CHECK(got->camera_id == sent.camera_id);
@@ -57,6 +59,13 @@ TEST_CASE("health message: comes back whole in about 120 bytes") {
   CHECK(got->last_error == sent.last_error);
   CHECK(got->version == sent.version);
   CHECK(got->pose_state == imprint::PoseState::hold);
+  CHECK(got->saturated_fraction == Approx(sent.saturated_fraction).epsilon(1e-7));
+  CHECK(got->blur_px == Approx(sent.blur_px).epsilon(1e-7));
+  CHECK(got->haze_px == Approx(sent.haze_px).epsilon(1e-7));
+  CHECK(got->body_level == Approx(sent.body_level).epsilon(1e-7));
+  CHECK(got->exposure_us == Approx(sent.exposure_us).epsilon(1e-7));
+  CHECK(got->gain_db == Approx(sent.gain_db).epsilon(1e-7));
+  CHECK(got->exposure_alarm.empty());
 }
 
 TEST_CASE("health message: a long error is cut to 80 bytes") {
@@ -91,6 +100,17 @@ TEST_CASE("receipt and delivery messages: come back whole, long reasons cut") {
   CHECK(told->fault == "no space left");
   CHECK_FALSE(decode_receipt(std::vector<std::uint8_t>{0x10}));
   CHECK_FALSE(decode_delivery(encode_delivery({"no id", 0, 0, 0, 0, 0, 0, 0, 0, ""})));
+}
+
+TEST_CASE("health message: an alarm of the exposure comes back, what is not finite is sent as 0") {
+  Health sent;
+  sent.camera_id = "cam1";
+  sent.exposure_alarm = "cannot hold the body out of saturation: exposure at its minimum 20 us";
+  sent.haze_px = std::numeric_limits<double>::quiet_NaN();
+  const auto got = decode_health(encode_health(sent));
+  REQUIRE(got);
+  CHECK(got->exposure_alarm == sent.exposure_alarm);
+  CHECK(got->haze_px == 0.0);
 }
 
 TEST_CASE("result message: comes back whole") {

@@ -65,6 +65,25 @@ TEST_CASE("node config: a fault names the file, the line and the key") {
           std::string::npos);
 }
 
+TEST_CASE("node config: the exposure's limits are read, and those that make no sense are faults") {
+  const TemporaryFolder folder;
+  const auto config = read(folder, std::string(kSmallest) + "[exposure]\nauto = false\nmin_us = 50\nmax_us = 900\n" +
+                                       "max_gain_db = 6\ntarget_level = 0.7\nmax_step = 2\n");
+  REQUIRE(config);
+  REQUIRE_FALSE(config->exposure.automatic);
+  REQUIRE(config->exposure.min_time_us == 50.0);
+  REQUIRE(config->exposure.max_time_us == 900.0);
+  REQUIRE(config->exposure.max_gain_db == 6.0);
+  REQUIRE(config->exposure.target_level == 0.7);
+  REQUIRE(config->exposure.max_step == 2.0);
+  const auto again = read(folder, to_toml(*config));
+  REQUIRE(again);
+  REQUIRE(to_toml(*again) == to_toml(*config));
+  REQUIRE(fault(std::string(kSmallest) + "[exposure]\nmin_us = 900\nmax_us = 50\n").find("min_us, max_us: expected") !=
+          std::string::npos);
+  REQUIRE(fault(std::string(kSmallest) + "[exposure]\nauto = 3\n").find("exposure.auto") != std::string::npos);
+}
+
 TEST_CASE("node config: a fault of an override says that it is the command line's") {
   REQUIRE(fault(kSmallest, "node.method=sharpest").find("node.method: expected one of best") != std::string::npos);
   REQUIRE(fault(kSmallest, "health.period_s=0").find("--set: health.period_s") != std::string::npos);

@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // A camera that gives the pictures it is told to.
-class FakeSource final : public FrameSource {
+class FakeSource final : public FrameSource, public AdjustableExposure {
  public:
   Result<Frame> capture(const CaptureRequest& request) override {
     ++captures;
@@ -22,10 +22,22 @@ class FakeSource final : public FrameSource {
     Frame frame;
     frame.sensor_time_ns = 42;
     frame.warnings = {"one channel of three"};
+    if (adjustable) frame.exposure = exposure_;
     return frame;
   }
+  AdjustableExposure* adjustable_exposure() override { return adjustable ? this : nullptr; }
+  [[nodiscard]] Exposure exposure() const override { return exposure_; }
+  Result<void> set_exposure(const Exposure& exposure) override {
+    if (refuses) return job_failed("camera 7: no answer to the exposure");
+    exposure_ = exposure;
+    return {};
+  }
+  bool adjustable = false, refuses = false;
   int failing_observation = -1;
   std::atomic<int> captures = 0;
+
+ private:
+  Exposure exposure_{1000.0, 0.0};
 };
 
 // A node, and someone who listens, on one bus.
@@ -194,6 +206,72 @@ TEST_CASE("node: health is sent on start and after every frame, with the last er
   REQUIRE(line.healths.back().targets_seen == 17);
   REQUIRE(line.healths.back().sequence == 1);
   REQUIRE(line.healths.back().last_error == std::string(79, 'x'));
+}
+
+// The imprints and the last health of frames that show a body of `level` at 1000 us.
+struct ExposureRun {
+  std::vector<Imprint> imprints;
+  Health health;
+};
+
+ExposureRun expose(Line& line, const NodeConfig& config, double level, std::uint32_t frames) {
+  NodeService node(
+      config, line.source,
+      [&](const Frame& frame) {
+        auto processed = seen(frame);
+        const double time_us = frame.exposure.time_us > 0 ? frame.exposure.time_us : 1000.0;
+        processed.imprint.quality.body_level = std::min(1.0, level * time_us / 1000.0);
+        processed.imprint.quality.saturated_fraction = processed.imprint.quality.body_level >= 1.0 ? 0.9 : 0.0;
+        return processed;
+      },
+      *line.node_side);
+  REQUIRE(node.start());
+  for (std::uint32_t i = 0; i < frames; ++i) line.fire(i);
+  auto imprints = line.wait_for_imprints(frames);
+  REQUIRE(imprints.size() == frames);
+  node.stop();
+  const std::lock_guard lock(line.mutex);
+  return {std::move(imprints), line.healths.back()};
+}
+
+TEST_CASE("node: a body that saturates is exposed less the next time; where that is at its end, health says so") {
+  Line line;
+  line.source.adjustable = true;
+  SECTION("it comes out of saturation") {
+    const auto run = expose(line, config(), 3.0, 3);
+    REQUIRE(run.imprints[0].quality.body_level == 1.0);
+    REQUIRE(run.imprints[2].quality.body_level == Approx(0.75));
+    REQUIRE(run.health.exposure_us == Approx(250.0));
+    REQUIRE(run.health.exposure_alarm.empty());
+  }
+  SECTION("it cannot") {
+    auto limited = config();
+    limited.exposure.min_time_us = 500.0;
+    const auto run = expose(line, limited, 3.0, 3);
+    const std::string alarm = "cannot hold the body out of saturation: exposure at its minimum 500 us";
+    REQUIRE(run.health.exposure_us == Approx(500.0));
+    REQUIRE(run.health.exposure_alarm == alarm);
+    REQUIRE(run.imprints[2].warnings.front() == "camera \"cam1\": " + alarm);
+  }
+  SECTION("the camera does not take it") {
+    line.source.refuses = true;
+    REQUIRE(expose(line, config(), 3.0, 1).health.exposure_alarm == "camera 7: no answer to the exposure");
+  }
+}
+
+TEST_CASE("node: a source whose exposure cannot be set, or must not, is left alone; that it saturates is told") {
+  Line line;
+  REQUIRE(expose(line, config(), 3.0, 1).health.exposure_alarm ==
+          "cannot hold the body out of saturation: the exposure of this frame source cannot be set");
+  Line other;
+  other.source.adjustable = true;
+  auto off = config();
+  off.exposure.automatic = false;
+  const auto run = expose(other, off, 3.0, 2);
+  REQUIRE(run.health.exposure_us == 1000.0);
+  REQUIRE(run.health.exposure_alarm == "cannot hold the body out of saturation: exposure.auto is off");
+  Line good;
+  REQUIRE(expose(good, config(), 0.8, 1).health.exposure_alarm.empty());
 }
 
 TEST_CASE("node: a trigger fires at its moment; one of clocks that disagree fires at once with a warning") {
