@@ -3,10 +3,9 @@
 
 #include <fmt/core.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "cli/brightened.h"
 #include "cli/command.h"
+#include "cli/silhouette_picture.h"
 #include "lib/config/atomic_file.h"
 #include "node/capture/image_file.h"
 #include "node/node_pipeline.h"
@@ -39,30 +38,9 @@ nlohmann::json end_json(const Segmentation& frame, const LocatedEnd& end) {
   return {{"x_px", p.x_px}, {"y_px", p.y_px}, {"sigma_px", end.sigma_px}, {"visible", end.visible}};
 }
 
-// The frame, brightened, with the rims from red (weight 0) to green (weight 1), the axis in blue, and the visible ends.
-Result<void> draw(const cv::Mat& image, const FilteredSilhouette& silhouette, const std::filesystem::path& path) {
-  constexpr int kShift = 4;  // drawing in 1/16 px
-  const cv::Mat picture = brightened(image);
-  const auto at = [&](double station_px, double offset_px) {
-    const ObservedPoint p = observed(silhouette.frame, station_px, offset_px);
-    return cv::Point(cvRound(p.x_px * (1 << kShift)), cvRound(p.y_px * (1 << kShift)));
-  };
-  for (const auto* curve : {&silhouette.upper, &silhouette.lower, &silhouette.axis}) {
-    for (const FilteredPoint& point : *curve) {
-      const cv::Scalar color = curve == &silhouette.axis
-                                   ? cv::Scalar(255, 80, 0)
-                                   : cv::Scalar(0, 255 * point.weight, 255 * (1.0 - point.weight));
-      cv::circle(picture, at(point.station_px, point.offset_px), 1 << kShift, color, cv::FILLED, cv::LINE_AA, kShift);
-    }
-  }
-  for (const LocatedEnd* end : {&silhouette.start, &silhouette.end}) {
-    if (end->visible) {
-      cv::drawMarker(picture, at(end->station_px, end->offset_px) / (1 << kShift), cv::Scalar(255, 255, 0),
-                     cv::MARKER_CROSS, 40, 2);
-    }
-  }
+Result<void> write_picture(const cv::Mat& image, const ProcessedFrame& processed, const std::filesystem::path& path) {
   std::vector<unsigned char> bytes;
-  cv::imencode(".png", picture, bytes);
+  cv::imencode(".png", draw_silhouette_picture(image, processed), bytes);
   return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -95,8 +73,8 @@ int run_edges(const EdgesOptions& options, bool as_json) {
   const ProcessedFrame processed = process_frame(*frame, *camera, *rig, *method);
   warnings.insert(warnings.end(), processed.imprint.warnings.begin(), processed.imprint.warnings.end());
   for (const std::string& warning : warnings) std::cerr << "imprint: warning: " << warning << '\n';
-  if (processed.silhouette && !options.debug_image.empty()) {
-    if (auto drawn = draw(frame->image, *processed.silhouette, options.debug_image); !drawn) return fail(drawn.error());
+  if (!options.debug_image.empty()) {
+    if (auto drawn = write_picture(frame->image, processed, options.debug_image); !drawn) return fail(drawn.error());
   }
   if (processed.error) return fail(*processed.error);
   const FilteredSilhouette& silhouette = *processed.silhouette;
@@ -133,9 +111,9 @@ void add_edges_command(Cli& cli) {
   command->add_option("--camera-id", options->camera_id, "the camera of the rig that took the image")->required();
   command->add_option("--method", options->method, "best, orientation, magnitude, combined, uniform, none or pixel")
       ->capture_default_str();
-  command->add_option(
-      "--debug-image", options->debug_image,
-      "PNG to write: the image, brightened, with the rims (green: trusted, red: not), the axis and the ends");
+  command->add_option("--debug-image", options->debug_image,
+                      "PNG to write: the image, brightened, with the rims (green: trusted, red: hardly), rejected "
+                      "edges, the axis, the ends");
   command->add_option("image", options->image, "PNG or TIFF")->required();
 }
 

@@ -154,9 +154,10 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
                                                                    segmentation.error().message)});
   }
 
-  const auto silhouette = timed(result, "edge", [&] {
+  result.edges = timed(result, "edge", [&] {
     return locate_edges(frame.image, *segmentation, rig.forging.polarity, method, EdgeConfig{});
   });
+  const Silhouette& silhouette = *result.edges;
   note_silhouette(silhouette, imprint);
 
   const auto filled = timed(result, "imprint", [&]() -> Result<void> {

@@ -24,6 +24,7 @@ struct ProcessedFrame {
   std::optional<Error> error;
   std::vector<DetectedTarget> targets;
   std::optional<Resection> resection;
+  std::optional<Silhouette> edges;  ///< as found, before they were filtered
   std::optional<FilteredSilhouette> silhouette;
   std::vector<std::pair<std::string, std::chrono::microseconds>> stage_times;
 };

@@ -188,7 +188,7 @@ void NodeService::control_exposure(const Frame& frame, Imprint& imprint) {
   }
   if (!alarm.empty())  // first: only three warnings are sure to be sent
     imprint.warnings.insert(imprint.warnings.begin(), fmt::format("camera \"{}\": {}", config_.camera_id, alarm));
-  const std::lock_guard lock(publish_mutex_);
+  const std::lock_guard lock(health_mutex_);
   if (alarm != health_.exposure_alarm && !alarm.empty()) spdlog::error("{}", alarm);
   health_.exposure_alarm = alarm;
   health_.exposure_us = frame.exposure.time_us;
