@@ -297,7 +297,12 @@ TEST_CASE("fusion: a gap is named until it is filled, also after a restart, and 
   REQUIRE(plant.counted("reordered") == 2);
 
   const auto reports = plant.outside->publish(plant.keys.delivery("cam1"), {.traffic = Traffic::health});
-  Delivery report{.camera_id = "cam1", .boot_id = 5, .sequence = 6, .oldest_waiting = 5, .waiting = 2};
+  Delivery report;
+  report.camera_id = "cam1";
+  report.boot_id = 5;
+  report.sequence = 6;
+  report.oldest_waiting = 5;
+  report.waiting = 2;
   report.discarded = 3;
   REQUIRE((*reports)->put(encode_delivery(report)));
   REQUIRE(eventually([&] { return delivery()["node"].is_object(); }));
