@@ -48,6 +48,7 @@ void add_edges_command(Cli& cli);
 void add_measure_command(Cli& cli);
 void add_report_command(Cli& cli);
 void add_simulate_command(Cli& cli);
-void add_live_commands(Cli& cli);  // status, watch, trigger
+void add_live_commands(Cli& cli);       // status, watch, trigger
+void add_recording_commands(Cli& cli);  // record, replay
 
 }  // namespace imprint

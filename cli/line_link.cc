@@ -14,6 +14,12 @@ constexpr auto kBetweenTries = milliseconds(30);
 
 }  // namespace
 
+void add_line_options(CLI::App& command, LineOptions& options) {
+  command.add_option("--connect", options.connect, "where fusion's router listens")->capture_default_str();
+  command.add_option("--site", options.site, "as in the configs")->capture_default_str();
+  command.add_option("--line", options.line, "as in the configs")->capture_default_str();
+}
+
 Result<LineLink> LineLink::open(const LineOptions& options) {
   auto keys = Keys::of(options.site, options.line);
   if (!keys) return pass_on(keys.error());

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "lib/result/result.h"
@@ -19,6 +20,8 @@ struct LineOptions {
   std::string site = "plant";
   std::string line = "L1";
 };
+
+void add_line_options(CLI::App& command, LineOptions& options);
 
 /// A command's connection to the running line.
 class LineLink {

@@ -30,12 +30,6 @@ constexpr std::size_t kMaxQueuedEvents = 4096;
 
 milliseconds to_milliseconds(double seconds) { return milliseconds(static_cast<std::int64_t>(seconds * 1000.0)); }
 
-void add_line_options(CLI::App& command, LineOptions& options) {
-  command.add_option("--connect", options.connect, "where fusion's router listens")->capture_default_str();
-  command.add_option("--site", options.site, "as in the configs")->capture_default_str();
-  command.add_option("--line", options.line, "as in the configs")->capture_default_str();
-}
-
 std::string joined(const json& names) {
   std::string text;
   for (const json& name : names) text.append(text.empty() ? "" : ", ").append(name.get<std::string>());

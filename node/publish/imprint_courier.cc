@@ -10,7 +10,6 @@
 namespace imprint {
 namespace {
 
-constexpr std::size_t kImprintHistory = 16;  // the fast way round a short gap; the spool is for the long ones
 constexpr std::size_t kMaxEvents = 1024;
 constexpr std::size_t kMaxReceiptBytes = 4096;
 constexpr auto kIdleWait = std::chrono::seconds(5);  // and how often a disk that was full is tried again
@@ -69,7 +68,8 @@ Result<void> ImprintCourier::declare(Transport& transport) {
     return {};
   };
   const std::string key = keys_.imprint(camera_id_);
-  if (auto done = publisher(key, {.traffic = Traffic::imprint, .history = kImprintHistory}, live_); !done) return done;
+  // Without Zenoh's history: after a cut it would bring the last ones ahead of those that the spool brings in order.
+  if (auto done = publisher(key, {.traffic = Traffic::imprint, .history = 0}, live_); !done) return done;
   if (auto done = publisher(key, {.traffic = Traffic::backlog, .history = 0}, backlog_); !done) return done;
   if (auto done = publisher(keys_.delivery(camera_id_), {.traffic = Traffic::health, .history = 0}, reports_); !done)
     return done;

@@ -125,7 +125,7 @@ class CabledLine(ReadyLine):
 
 def cable_cut(work, ready, cut_s, observations):
     """The cable is cut after the observations were triggered and before the cameras fire."""
-    lead_s = 3.0 + 0.5 * observations
+    lead_s = 3.0 + 1.5 * observations  # a busy machine takes a second for the command
     with Cable() as cable, CabledLine(work, ready, cable, deadline_s=min(10.0, cut_s + 5)) as line:
         line.start_all()
         sessions = sessions_of(observations)
@@ -133,7 +133,9 @@ def cable_cut(work, ready, cut_s, observations):
         for index, session in enumerate(sessions):
             share = index / observations
             line.trigger_until_taken(session, in_s=max(0.1, lead_s + share * cut_s - (time.monotonic() - begin)))
-        time.sleep(max(0.0, lead_s - 0.2 - (time.monotonic() - begin)))
+        early_s = lead_s - 0.2 - (time.monotonic() - begin)
+        assert early_s > 0, f"triggering took {-early_s:.1f} s too long to cut the cable before the cameras fire"
+        time.sleep(early_s)
         with cable.cut():
             time.sleep(cut_s + 1)
             meanwhile = line.status()

@@ -23,8 +23,8 @@ from ready_imprints import ReadyImprints  # noqa: E402
 FAULTS = {
     "kills": lambda work, ready, python: faults.kills(work, ready, python, observations=200, kill_count=50),
     "cut-2s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=2, observations=5),
-    "cut-20s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=20, observations=20),
-    "cut-50s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=50, observations=12),
+    "cut-20s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=20, observations=12),
+    "cut-50s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=50, observations=8),
     "loss-5": lambda work, ready, _: faults.packet_loss(work, ready, percent=5, observations=50),
     "loss-20": lambda work, ready, _: faults.packet_loss(work, ready, percent=20, observations=20),
     "node-disk": lambda work, ready, _: faults.node_disk_full(work, ready),
