@@ -100,6 +100,7 @@ struct ReplayOptions {
   std::string file;
   std::string rig;
   std::string session;
+  std::optional<std::string> geometry;  // else as recorded
   std::optional<std::string> connect;
   LineOptions line;
 };
@@ -187,7 +188,10 @@ int evaluate(const ReplayOptions& options, bool as_json) {
     const json before =
         recorded == recording->results.end() ? json() : json::parse(recorded->second.json, nullptr, false);
     const std::string method = before.is_object() ? before.value("method", "best") : "best";
-    const auto measurement = fuse(assembler.observations(session), rig->forging, session, method);
+    const std::string geometry =
+        options.geometry.value_or(before.is_object() ? before.value("geometry", "joint") : "joint");
+    const auto measurement =
+        fuse(assembler.observations(session), rig->forging, session, method, geometry_method_of(geometry));
     json entry = {{"session", session}, {"error", ""}, {"result", nullptr}, {"same_as_recorded", nullptr}};
     if (measurement) {
       entry["result"] = to_json(*measurement);
@@ -268,6 +272,8 @@ void add_recording_commands(Cli& cli) {
   replay->add_option("--connect", replay_options->connect, "feed the fusion whose router listens there");
   replay->add_option("--site", replay_options->line.site, "of that fusion")->capture_default_str();
   replay->add_option("--line", replay_options->line.line, "of that fusion")->capture_default_str();
+  replay->add_option("--geometry", replay_options->geometry, "with --rig: joint or thesis; else as recorded")
+      ->check(CLI::IsMember(std::vector<std::string>(kGeometryMethods.begin(), kGeometryMethods.end())));
   replay->add_option("--session", replay_options->session, "only this one");
 }
 
