@@ -47,6 +47,8 @@ void add_verify_command(Cli& cli);
 void add_edges_command(Cli& cli);
 void add_measure_command(Cli& cli);
 void add_report_command(Cli& cli);
+void add_compare_command(Cli& cli);
+void add_straighten_command(Cli& cli);
 void add_simulate_command(Cli& cli);
 void add_live_commands(Cli& cli);       // status, watch, trigger
 void add_recording_commands(Cli& cli);  // record, replay

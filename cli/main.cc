@@ -14,6 +14,8 @@ int main(int argc, char** argv) {
   imprint::add_edges_command(cli);
   imprint::add_measure_command(cli);
   imprint::add_report_command(cli);
+  imprint::add_compare_command(cli);
+  imprint::add_straighten_command(cli);
   imprint::add_simulate_command(cli);
   imprint::add_live_commands(cli);
   imprint::add_recording_commands(cli);

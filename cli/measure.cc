@@ -4,8 +4,11 @@
 
 #include <fmt/core.h>
 
+#include "cli/acceptance_table.h"
 #include "cli/command.h"
+#include "cli/hot_options.h"
 #include "cli/result_table.h"
+#include "fusion/acceptance/acceptance.h"
 #include "fusion/fusion_pipeline.h"
 #include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
@@ -23,6 +26,8 @@ struct MeasureOptions {
   std::string method = "best";
   std::string geometry = "joint";
   std::vector<std::string> stations;  // NAME=MM
+  HotOptions hot;
+  std::filesystem::path nominal;
 };
 
 // The imprint with its curves rounded as the wire rounds them, so that a running line gives the same numbers; where
@@ -94,6 +99,8 @@ Result<Measurement> measure(const MeasureOptions& options) {
   if (!stations) return pass_on(stations.error());
   const auto method = edge_method_from_name(options.method);
   if (!method) return pass_on(method.error());
+  auto cooling = cooling_from(options.hot);
+  if (!cooling) return pass_on(cooling.error());
   std::vector<std::string> warnings;
   const auto session = read_session_file(options.session, warnings);
   if (!session) return pass_on(session.error());
@@ -110,6 +117,7 @@ Result<Measurement> measure(const MeasureOptions& options) {
   if (!measurement) return measurement;
   measurement->warnings.insert(measurement->warnings.begin(), rig->warnings.begin(), rig->warnings.end());
   measurement->warnings.insert(measurement->warnings.begin(), warnings.begin(), warnings.end());
+  measurement->cooling = std::move(*cooling);
   measurement->stations = std::move(*stations);
   for (const Measurement::Station& station : measurement->stations)
     if (station.s_mm > measurement->length_mm)
@@ -120,16 +128,28 @@ Result<Measurement> measure(const MeasureOptions& options) {
 }
 
 int run_measure(const MeasureOptions& options, bool json) {
+  std::optional<Nominal> nominal;
+  if (!options.nominal.empty()) {
+    auto read = read_nominal(options.nominal);
+    if (!read) return fail(read.error());
+    nominal = std::move(*read);
+  }
   const auto measurement = measure(options);
   if (!measurement) return fail(measurement.error());
   for (const std::string& warning : measurement->warnings) std::cerr << "imprint: warning: " << warning << '\n';
-  const auto document = to_json(*measurement);
+  auto document = to_json(*measurement);
+  if (nominal) {
+    const auto acceptance = accept(*measurement, *nominal);
+    if (!acceptance) return fail(acceptance.error());
+    document["nominal"] = to_json(*acceptance);
+  }
   if (!options.out.empty()) {
     if (auto written = write_file_atomically(options.out, document.dump(1) + "\n"); !written)
       return fail(written.error());
   }
   if (json) return print_json(document);
   std::cout << result_table(*measurement);
+  for (const std::string& line : acceptance_lines(document)) std::cout << "  " << line << '\n';
   return 0;
 }
 
@@ -149,6 +169,9 @@ void add_measure_command(Cli& cli) {
       ->capture_default_str();
   command->add_option("--station", options->stations,
                       "NAME=MM: name a place whose diameter is reported; may be repeated");
+  add_hot_options(*command, options->hot);
+  command->add_option("--nominal", options->nominal,
+                      "what is wanted (TOML or CSV): tolerances, allowance, finished part");
   command->add_option("--out", options->out, "write result.json here");
 }
 

@@ -1,8 +1,11 @@
 #include <filesystem>
 #include <optional>
 
+#include "cli/acceptance_table.h"
 #include "cli/command.h"
+#include "cli/hot_options.h"
 #include "cli/report_page.h"
+#include "cli/result_file.h"
 #include "cli/result_table.h"
 #include "lib/config/atomic_file.h"
 
@@ -11,27 +14,8 @@ namespace {
 
 struct ReportOptions {
   std::filesystem::path result, truth, out;
+  HotOptions hot;
 };
-
-struct ReadResult {
-  Measurement measurement;
-  nlohmann::json document;  // with what this program does not know of
-};
-
-Result<ReadResult> read_result(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return pass_on(text.error());
-  try {
-    auto document = nlohmann::json::parse(*text);
-    auto measurement = measurement_from_json(document);
-    if (!measurement) return invalid_input("{}: {}", path.string(), measurement.error().message);
-    if (measurement->sections.empty())
-      return invalid_input("{}: expected a result with sections, found none", path.string());
-    return ReadResult{std::move(*measurement), std::move(document)};
-  } catch (const nlohmann::json::exception& error) {
-    return invalid_input("{}: not a result file: {}", path.string(), error.what());
-  }
-}
 
 enum class Form { table, page };
 
@@ -46,8 +30,14 @@ Result<Form> form_of(const std::filesystem::path& out) {
 int run_report(const ReportOptions& options, bool as_json) {
   const auto form = form_of(options.out);
   if (!form) return fail(form.error());
-  const auto read = read_result(options.result);
+  auto cooling = cooling_from(options.hot);
+  if (!cooling) return fail(cooling.error());
+  auto read = read_result_file(options.result);
   if (!read) return fail(read.error());
+  if (*cooling) {
+    read->measurement.cooling = std::move(*cooling);
+    read->document["cold"] = to_json(read->measurement)["cold"];
+  }
   const Measurement* measurement = &read->measurement;
   std::optional<TruthComparison> truth;
   if (!options.truth.empty()) {
@@ -56,7 +46,9 @@ int run_report(const ReportOptions& options, bool as_json) {
     truth = std::move(*comparison);
   }
   const TruthComparison* compared = truth ? &*truth : nullptr;
-  const std::string table = result_table(*measurement, compared) + warning_lines(*measurement);
+  std::string table = result_table(*measurement, compared);
+  for (const std::string& line : acceptance_lines(read->document)) table += "  " + line + "\n";
+  table += warning_lines(*measurement);
   if (!options.out.empty()) {
     const std::string report = *form == Form::page ? report_page(*measurement, read->document, compared) : table;
     if (auto written = write_file_atomically(options.out, report); !written) return fail(written.error());
@@ -83,6 +75,7 @@ void add_report_command(Cli& cli) {
   command->add_option("result", options->result, "result.json")->required();
   command->add_option("--out", options->out,
                       "write it here too: a page for paper and archive (.html) or the table (.txt)");
+  add_hot_options(*command, options->hot);
   command->add_option("--truth", options->truth, "truth.json of a simulated forging: show the errors too");
 }
 

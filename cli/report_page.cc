@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include "cli/acceptance_table.h"
 #include "cli/report_look.h"
 #include "cli/result_summary.h"
 #include "cli/result_table.h"
@@ -54,6 +55,14 @@ std::string result_rows(const Measurement& m, const TruthComparison* truth) {
   return rows;
 }
 
+std::string acceptance(const nlohmann::json& document) {
+  const std::vector<std::string> lines = acceptance_lines(document);
+  if (lines.empty()) return "";
+  std::string text = "<h2>Against the nominal</h2>\n<ul id=\"nominal\">";
+  for (const std::string& line : lines) text += "<li>" + markup_text(line) + "</li>";
+  return text + "</ul>\n";
+}
+
 std::string figure(const char* id, const char* caption, const std::string& svg) {
   return fmt::format("<figure id=\"{}\"><figcaption>{}</figcaption>{}</figure>\n", id, caption, svg);
 }
@@ -69,6 +78,13 @@ std::string results(const Measurement& m, const TruthComparison* truth, const Re
       "<p class=\"note\">The interval of a largest or smallest value is that of its section; a median stands with the "
       "median interval. The direction is seen from the first end, z up.</p>\n";
   if (truth != nullptr) text += "<p>" + markup_text(truth_text(m, *truth)) + ".</p>\n";
+  text += "<p id=\"cold\">" + markup_text(cold_source(m)) + ".</p>\n";
+  if (m.cooling) {
+    text += "<table><tbody>\n";
+    for (const ResultRow& row : cold_rows(m))
+      text += "<tr>" + cell(markup_text(row.what)) + number(row.measured) + known_number(row.ci95) + "</tr>\n";
+    text += "</tbody></table>\n";
+  }
   if (m.gain.observations > 0) text += "<p id=\"gain\">" + markup_text(gain_text(m.gain)) + ".</p>\n";
   return text;
 }
@@ -135,8 +151,8 @@ std::string report_page(const Measurement& m, const nlohmann::json& document, co
       "<title>Imprint: {}</title>\n<style>\n{}</style>\n</head>\n<body>\n",
       or_dash(m.session), kReportLook);
   const ResultPlots drawn = draw_result(m, truth != nullptr ? truth->sections : std::vector<Measurement::Section>{});
-  page +=
-      heading(m) + warnings(m) + results(m, truth, drawn) + cameras(m) + plots(drawn, truth != nullptr) + sections(m);
+  page += heading(m) + warnings(m) + results(m, truth, drawn) + acceptance(document) + cameras(m) +
+          plots(drawn, truth != nullptr) + sections(m);
   page += "<footer>Imprint " IMPRINT_VERSION
           ". x along the ideal axis from the first end, y and z across it; diameter: mean over the directions; "
           "circularity: half of the largest less the smallest width.</footer>\n";

@@ -69,4 +69,23 @@ std::vector<ResultRow> summarize(const Measurement& m, const TruthComparison* tr
   return rows;
 }
 
+std::vector<ResultRow> cold_rows(const Measurement& m) {
+  std::vector<ResultRow> rows;
+  if (!m.cooling) return rows;
+  const auto add = [&](std::string what, const Length& hot) {
+    const Length cold = m.cooling->cold(hot);
+    rows.push_back({std::move(what), cold.mm, cold.ci95_mm, std::nullopt, {}});
+  };
+  add("cold length, mm", {m.length_mm, m.length_ci95_mm});
+  add("cold deflection, mm", m.straightness.max_deflection);
+  add("cold mean diameter, mm", m.diameters.mean);
+  add("cold smallest diameter, mm", m.diameters.smallest);
+  add("cold largest diameter, mm", m.diameters.largest);
+  for (const Measurement::Station& station : m.stations) {
+    const Section section = section_at(m, station.s_mm);
+    add(fmt::format("cold diameter at {}, mm", station.name), {section.diameter_mm, section.diameter_ci95_mm});
+  }
+  return rows;
+}
+
 }  // namespace imprint

@@ -21,4 +21,7 @@ struct ResultRow {
 /// What a person wants to know first, the same in every report. `measurement` has sections.
 std::vector<ResultRow> summarize(const Measurement& measurement, const TruthComparison* truth);
 
+/// The same of the cold forging; nothing where the temperature is not known.
+std::vector<ResultRow> cold_rows(const Measurement& measurement);
+
 }  // namespace imprint

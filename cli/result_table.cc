@@ -35,6 +35,23 @@ std::string gain_text(const Measurement::Gain& gain) {
       gain.first_alone.diameter_ci95_mm, gain.all.circularity_ci95_mm, gain.first_alone.circularity_ci95_mm);
 }
 
+std::string cold_source(const Measurement& m) {
+  if (!m.cooling)
+    return "All values are of the forging as hot as it was; its temperature is not known, so neither are the cold ones";
+  const Cooling& c = *m.cooling;
+  return fmt::format(
+      "Cold, at {:.0f} C: {} ({}) shrinks by {:.3f} % from {:.0f} +- {:.0f} C (95 %, temperature: {}); expansion after "
+      "{}",
+      kColdC, c.grade, c.steel, 100.0 * (1.0 - 1.0 / (1.0 + c.expansion.share)), c.hot.temperature_c,
+      1.96 * c.hot.temperature_sigma_c, c.hot.source, c.expansion_source);
+}
+
+std::string cold_lines(const Measurement& m) {
+  std::string text = "  " + cold_source(m) + "\n";
+  for (const ResultRow& row : cold_rows(m)) text += table_row(row);
+  return text;
+}
+
 std::string result_table(const Measurement& m, const TruthComparison* truth) {
   std::string text = fmt::format("Forging \"{}\", {} observation{}, method {}\n", m.session, m.observations.size(),
                                  m.observations.size() == 1 ? "" : "s", m.method);
@@ -42,6 +59,7 @@ std::string result_table(const Measurement& m, const TruthComparison* truth) {
   text += truth != nullptr ? fmt::format(" {:>10} {:>9}\n", "truth", "error") : "\n";
   for (const ResultRow& row : summarize(m, truth)) text += table_row(row);
   if (truth != nullptr) text += "  " + truth_text(m, *truth) + "\n";
+  text += cold_lines(m);
   if (m.gain.observations > 0) text += "  " + gain_text(m.gain) + "\n";
   for (const auto& observation : m.observations) {
     text += fmt::format("  observation {} at {:.1f} deg:", observation.index, observation.rotation_deg);

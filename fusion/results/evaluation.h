@@ -22,7 +22,8 @@ struct Straightness {
   Length minimum_zone;     ///< diameter of the narrowest cylinder that holds the axis, ISO 12780-1
 };
 
-/// The mean's interval is that of the sections that are seen. Largest and smallest stand with the interval of their section: that of an extreme would tell of the least known.
+/// The mean's interval is that of the sections that are seen. Largest and smallest stand with the interval of their
+/// section: that of an extreme would tell of the least known.
 struct Diameters {
   Length mean, smallest, largest;
   double smallest_at_mm = 0.0, largest_at_mm = 0.0;

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "fusion/combine/combine.h"
+#include "fusion/results/cold.h"
 #include "fusion/results/evaluation.h"
 
 namespace imprint {
@@ -52,7 +54,10 @@ struct Measurement {
   std::vector<Section> sections;
   std::vector<SectionRoundness> roundness;  ///< one a section; none where their shapes are not known
   std::vector<Station> stations;
+  std::optional<Cooling> cooling;  ///< where the temperature is known; all else is of the hot forging
   Gain gain;
+  ForgingShape shape;               ///< one a section, while the measurement is at hand: it is not in the file
+  std::vector<ForgingShape> draws;  ///< CombinedForging, likewise
   std::vector<Observation> observations;
   std::vector<std::string> warnings;
 };

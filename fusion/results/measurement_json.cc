@@ -146,6 +146,33 @@ CameraShare camera_from_json(const nlohmann::json& json) {
   return camera;
 }
 
+nlohmann::json cooling_to_json(const Cooling& cooling, const Measurement& m) {
+  nlohmann::json json = {{"grade", cooling.grade},
+                         {"steel", cooling.steel},
+                         {"temperature_c", cooling.hot.temperature_c},
+                         {"temperature_sigma_c", cooling.hot.temperature_sigma_c},
+                         {"temperature_source", cooling.hot.source},
+                         {"expansion", cooling.expansion.share},
+                         {"expansion_sigma", cooling.expansion.sigma},
+                         {"expansion_source", cooling.expansion_source},
+                         {"cold_c", kColdC}};
+  put(json, "length", cooling.cold({m.length_mm, m.length_ci95_mm}));
+  put(json, "max_deflection", cooling.cold(m.straightness.max_deflection));
+  put(json, "diameter_mean", cooling.cold(m.diameters.mean));
+  put(json, "diameter_min", cooling.cold(m.diameters.smallest));
+  put(json, "diameter_max", cooling.cold(m.diameters.largest));
+  return json;
+}
+
+Cooling cooling_from_json(const nlohmann::json& json) {
+  return {.grade = json.at("grade").get<std::string>(),
+          .steel = json.at("steel").get<std::string>(),
+          .expansion_source = json.at("expansion_source").get<std::string>(),
+          .hot = {json.at("temperature_c").get<double>(), json.at("temperature_sigma_c").get<double>(),
+                  json.at("temperature_source").get<std::string>()},
+          .expansion = {json.at("expansion").get<double>(), json.at("expansion_sigma").get<double>()}};
+}
+
 }  // namespace
 
 nlohmann::json to_json(const Measurement& measurement) {
@@ -176,6 +203,7 @@ nlohmann::json to_json(const Measurement& measurement) {
                                              {"diameter_mm", section.diameter_mm},
                                              {"diameter_ci95_mm", section.diameter_ci95_mm}});
   }
+  if (measurement.cooling) json["cold"] = cooling_to_json(*measurement.cooling, measurement);
   json["sections"] = nlohmann::json::array();
   for (std::size_t i = 0; i < measurement.sections.size(); ++i) {
     nlohmann::json section = section_to_json(measurement.sections[i]);
@@ -220,6 +248,7 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     if (json.contains("diameters"))
       for (const nlohmann::json& station : json.at("diameters").value("stations", nlohmann::json::array()))
         measurement.stations.push_back({station.at("name").get<std::string>(), station.at("s_mm").get<double>()});
+    if (json.contains("cold")) measurement.cooling = cooling_from_json(json.at("cold"));
     if (json.contains("gain")) {
       const nlohmann::json& gain = json.at("gain");
       measurement.gain = {gain.at("observations").get<int>(), sureness_from_json(gain.at("first_alone")),

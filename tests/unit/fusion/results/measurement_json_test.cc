@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <catch2/catch.hpp>
 
 #include "fusion/results/measurement.h"
@@ -37,7 +39,21 @@ Measurement example() {
                  .diameter_ci95_mm = 0.1,
                  .circularity_ci95_mm = 0.3}};
   m.roundness = {{{2.0, 0.1}, {1.9, 0.1}, {2.1, 0.2}}, {{3.0, 0.1}, {2.9, 0.1}, {3.1, 0.2}}};
+  m.stations = {{"head", 2.5}};
+  m.cooling = cooling_of(*known_steels(), "42CrMo4", {1000.0, 20.0, "pyrometer"}).value();
   return m;
+}
+
+TEST_CASE("measurement: the cold forging is smaller by the steel's expansion, and less surely known") {
+  const Measurement m = example();
+  const Length cold = m.cooling->cold(m.diameters.mean);
+  CHECK(cold.mm == Approx(260.0 / 1.0138));
+  // 4 % of the expansion and 20 C, at 2e-5 a C.
+  CHECK(
+      cold.ci95_mm ==
+      Approx(std::hypot(0.1 / 1.0138, 1.96 * 260.0 * std::hypot(0.04 * 0.0138, 4e-4) / 1.0138 / 1.0138)).epsilon(1e-3));
+  CHECK(to_json(m)["cold"]["temperature_source"] == "pyrometer");
+  CHECK(to_json(m)["cold"]["diameter_mean_mm"].get<double>() == Approx(cold.mm));
 }
 
 }  // namespace
