@@ -93,6 +93,14 @@ void note_measures(const FrameMeasures& measures, Imprint& imprint) {
   imprint.quality.frame_saturated_fraction = measures.frame_saturated_fraction;
 }
 
+void note_other_bodies(const Segmentation& forging, Imprint& imprint) {
+  for (const SeenBody& other : forging.others) {
+    imprint.warnings.push_back(fmt::format("camera \"{}\": another body at ({:.0f}, {:.0f}) px, {:.0f} x {:.0f} px: {}",
+                                           imprint.camera_id, other.middle.x_px, other.middle.y_px, other.length_px,
+                                           other.width_px, other.why_not));
+  }
+}
+
 void note_silhouette(const Silhouette& silhouette, Imprint& imprint) {
   imprint.quality.edge_points = static_cast<int>(silhouette.upper.size() + silhouette.lower.size());
   imprint.quality.contrast = silhouette.contrast;
@@ -153,6 +161,8 @@ ProcessedFrame process_frame(const Frame& frame, const CameraModel& camera, cons
     return give_up(result, {segmentation.error().kind, fmt::format("{}: camera \"{}\": {}", frame.source, camera.id,
                                                                    segmentation.error().message)});
   }
+
+  note_other_bodies(*segmentation, imprint);
 
   result.edges = timed(result, "edge", [&] {
     return locate_edges(frame.image, *segmentation, rig.forging.polarity, method, EdgeConfig{});

@@ -59,7 +59,7 @@ double inside_weight(const cv::Mat_<float>& image, int x, const ColumnSums& sums
   return std::clamp((share - 0.3) / 0.35, 0.0, 1.0);
 }
 
-// Weights by contrast: one half for a third of the step of the strongest pairs.
+// Weights by contrast: one half for a third of the step of the strongest pairs, at most for kPlainStep.
 void weigh_contrast(RimPairs& pairs) {
   std::vector<float> steps;
   for (const auto& column : pairs.columns)
@@ -67,7 +67,8 @@ void weigh_contrast(RimPairs& pairs) {
   if (steps.empty()) return;
   const auto high = steps.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(steps.size() - 1));
   std::nth_element(steps.begin(), high, steps.end());
-  pairs.half_step = *high / 3;
+  constexpr float kPlainStep = 0.05F;  // share of full scale: half of the faintest forging to be found
+  pairs.half_step = std::min(*high / 3, kPlainStep);
   for (auto& column : pairs.columns)
     for (RimPair& pair : column) pair.weight *= pair.step / (pair.step + pairs.half_step);
 }

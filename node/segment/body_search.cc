@@ -4,17 +4,18 @@
 #include <cmath>
 
 #include "node/segment/body_levels.h"
+#include "node/segment/body_rims.h"
 
 namespace imprint {
 namespace {
 
-// How well a body fits what is looked for, 0 to 1: seen and bright along its length, elongated, of a likely width, and
-// near where the cameras of a rig are pointed.
-double rate_body(const BodyPath& path, const WorkingImage& working, const SegmentPrior& prior,
+// How well a body fits what is looked for, 0 to 1: proven along its length, elongated, of a likely width, and near
+// where the cameras of a rig are pointed.
+double rate_body(const BodyPath& path, const BodyProof& proof, const WorkingImage& working, const SegmentPrior& prior,
                  const SegmentConfig& config) {
   if (path.empty()) return 0.0;
   const double width = path.median_width_px(), elongation = path.length_px() / std::max(1.0, width);
-  const double by_length = std::min(1.0, elongation / config.full_elongation);
+  const double by_length = elongation / (elongation + config.half_elongation);
 
   const double width_px = width * working.reduction;
   const double low = prior.likely_min_px > 0 ? prior.likely_min_px : prior.diameter_min_px;
@@ -27,7 +28,9 @@ double rate_body(const BodyPath& path, const WorkingImage& working, const Segmen
   for (const auto& c : path.columns)
     nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
   const double z = nearest / (config.center_reach * working.shorter_side_px);
-  return path.mean_weight() * by_length * by_width / (1 + z * z);
+  const double solid = std::clamp((proof.filled - 0.35) / 0.35, 0.0, 1.0);
+  const double by_contrast = proof.contrast / (proof.contrast + config.faint_contrast);
+  return (0.75 * proof.both + 0.25 * proof.one) * solid * by_contrast * by_length * by_width / (1 + z * z);
 }
 
 // The level that a section must have to belong to the body: a beam that happens to go on where the forging ends is
@@ -48,44 +51,65 @@ float least_body_level(const BodyPath& path, const WorkingImage& working, const 
   return dark + static_cast<float>(config.min_body_level) * (usual - dark);
 }
 
-// Columns without a pair, in long gaps and towards the ends, get the rough rims.
-void fill_gaps(BodyPath& path, const std::vector<RimPair>& rough, int first_x_px) {
-  constexpr int kBridged = 8;  // columns over which a straight line serves
-  std::vector<BodyPath::Column> filled;
-  int before = first_x_px - kBridged - 1;
-  const auto fill_to = [&](int next) {
-    if (next - before <= kBridged) return;
-    for (int x = before + 1; x < next; ++x) {
-      const int k = x - first_x_px;
-      if (k >= 0 && k < static_cast<int>(rough.size())) filled.push_back({x, rough[static_cast<std::size_t>(k)]});
-    }
-  };
-  for (const auto& column : path.columns) {
-    fill_to(column.x_px);
-    filled.push_back(column);
-    before = column.x_px;
-  }
-  fill_to(first_x_px + static_cast<int>(rough.size()) + kBridged);
-  path.columns = std::move(filled);
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
-// A line that is followed, with what came of it.
-struct Candidate {
-  FoundBody body;
-  double rating = 0.0;
-};
+// Cuts off what goes on behind an end: from `inside_x_px` outwards, where over a third of the width brightness and
+// width change together (a jaw), or the width leaves what one forging at one distance can have.
+void cut_ends(BodyPath& path, const BodyLevels& levels, int inside_x_px) {
+  if (path.empty()) return;
+  const double width = path.median_width_px();
+  constexpr double kJaw = 1.7;  // of the usual width: more than a forging has in steps
+  const int n = static_cast<int>(path.columns.size()), span = std::max(4, static_cast<int>(width));
+  const double dark = levels.ground[static_cast<std::size_t>(inside_x_px)];
+  const auto level = [&](int i) {
+    const auto x = static_cast<std::size_t>(path.columns[static_cast<std::size_t>(i)].x_px);
+    return static_cast<double>(levels.body[x]) - dark;
+  };
+  const auto width_at = [&](int i) {
+    return static_cast<double>(path.columns[static_cast<std::size_t>(i)].pair.width_px());
+  };
+  const auto median = [&](int from, int to, auto value) {
+    std::vector<double> values;
+    for (int i = std::max(0, std::min(from, to)); i <= std::min(n - 1, std::max(from, to)); ++i)
+      values.push_back(value(i));
+    return values.empty() ? 0.0 : median_of(std::move(values));
+  };
+  const int inside = std::clamp(inside_x_px - path.columns.front().x_px, 0, n - 1);
+  int ends[2] = {0, n - 1};
+  for (const int side : {0, 1}) {
+    const int step = side == 0 ? -1 : 1;
+    for (int i = inside; i >= 0 && i < n; i += step) {
+      const double before = median(i - step * span, i - step, width_at),
+                   behind = median(i + step, i + step * span, width_at);
+      if (std::abs(i - inside) < span / 2 || behind <= 0) continue;
+      const double change =
+          median(i + step, i + step * span, level) / std::max(1e-6, median(i - step * span, i - step, level));
+      const bool other_level = change < 0.7 || change > 1.4;
+      if ((behind > 1.5 * before && other_level) || behind > kJaw * width) {
+        // The window looks ahead: up to where the width itself changes.
+        while (i + step >= 0 && i + step < n && width_at(i + step) < 1.25 * before) i += step;
+        ends[side] = i;
+        break;
+      }
+    }
+  }
+  path.columns = {path.columns.begin() + ends[0], path.columns.begin() + ends[1] + 1};
+}
 
 // The body about its own axis, then once more with its brightness known.
-void follow_again(Candidate& candidate, const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
+void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
                   const SegmentPrior& prior, double max_offset_px, const SegmentConfig& config) {
-  FoundBody& body = candidate.body;
   body.axis = fit_axis(body.seen, body.axis);
   const auto about_axis = [&](float least_body) {
     return pairs_about_axis(pairs, working, rims, body.axis, max_offset_px, least_body, config.max_rims_per_column);
   };
   body.seen = follow_body(about_axis(least_body_level(body.seen, working, config)), working, body.axis, max_offset_px,
                           config.max_gap_diameters);
-  candidate.rating = rate_body(body.seen, working, prior, config);
+  body.rating = 0.0;
   body.whole = body.seen;
   if (body.seen.empty()) return;
 
@@ -99,13 +123,11 @@ void follow_again(Candidate& candidate, const RimPairs& pairs, const RimCandidat
     if (c.pair.both && c.pair.body >= least_body && std::abs(c.x_px - middle) < nearest)
       nearest = std::abs(c.x_px - middle), inside = c.x_px;
   const BodyLevels levels =
-      measure_levels(working, body.axis, width, inside, least_body, 0.8 * config.max_gap_diameters * width);
-  BodyPath refined = follow_body(weigh_by_levels(about_axis(least_body), working, levels), working, body.axis,
-                                 max_offset_px, 2.0 * config.max_gap_diameters);
-  candidate.rating = rate_body(refined, working, prior, config);
-  if (refined.length_px() < 0.5 * body.seen.length_px()) return;
-  fill_gaps(refined, rims_by_brightness(working, body.axis, levels, width), levels.first_x_px);
-  body.whole = std::move(refined);
+      measure_levels(working, body.axis, width, inside, least_body, config.max_gap_diameters * width);
+  body.whole = trace_rims(working, body.axis, levels, rims, width, 0.4 * pairs.min_width_px, 0.6 * pairs.max_width_px);
+  cut_ends(body.whole, levels, inside);
+  body.proof = prove_body(body.whole, working, levels);
+  body.rating = rate_body(body.whole, body.proof, working, prior, config);
 }
 
 }  // namespace
@@ -131,24 +153,56 @@ AxisLine fit_axis(const BodyPath& path, const AxisLine& start) {
   return line;
 }
 
-FoundBody find_body(const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
-                    const SegmentPrior& prior, const SegmentConfig& config) {
+std::vector<FoundBody> glimpse_bodies(const RimPairs& pairs, const WorkingImage& working, const SegmentPrior& prior,
+                                      const SegmentConfig& config) {
+  const double max_offset_px = config.max_axis_bow * pairs.min_width_px + 3.0;
+  std::vector<FoundBody> bodies;
+  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, 0.3 * pairs.min_width_px, config)) {
+    FoundBody body;
+    body.axis = line;
+    body.seen = follow_body(pairs, working, line, max_offset_px, config.max_gap_diameters);
+    if (body.seen.empty()) continue;
+    const double width = body.seen.median_width_px();
+    body.proof =
+        prove_body(body.seen, working,
+                   levels_between(working, line, width, body.seen.columns.front().x_px, body.seen.columns.back().x_px));
+    body.rating = rate_body(body.seen, body.proof, working, prior, config);
+    bodies.push_back(std::move(body));
+  }
+  std::sort(bodies.begin(), bodies.end(), [](const FoundBody& a, const FoundBody& b) { return a.rating > b.rating; });
+  return bodies;
+}
+
+namespace {
+
+// The best `count` bodies, leaving out those that lie along one that rates better.
+void keep_distinct(std::vector<FoundBody>& bodies, std::size_t count) {
+  constexpr double kSameSlope = 0.04;
+  std::vector<FoundBody> kept;
+  for (FoundBody& body : bodies) {
+    if (kept.size() == count) break;
+    const double x = body.seen.columns[body.seen.columns.size() / 2].x_px;
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const FoundBody& k) {
+      return x >= k.seen.columns.front().x_px && x <= k.seen.columns.back().x_px &&
+             std::abs(k.axis.y_px(x) - body.axis.y_px(x)) < 0.2 * k.seen.median_width_px() &&
+             std::abs(k.axis.slope - body.axis.slope) < kSameSlope;
+    });
+    if (!known) kept.push_back(std::move(body));
+  }
+  bodies = std::move(kept);
+}
+
+}  // namespace
+
+std::vector<FoundBody> find_bodies(const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
+                                   const SegmentPrior& prior, const SegmentConfig& config) {
   constexpr std::size_t kFollowedAgain = 5;
   const double max_offset_px = config.max_axis_bow * pairs.min_width_px + 3.0;
-  std::vector<Candidate> candidates;
-  for (const AxisLine& line : vote_axis_lines(pairs, working.intensity.rows, 0.3 * pairs.min_width_px, config)) {
-    Candidate candidate;
-    candidate.body.axis = line;
-    candidate.body.seen = follow_body(pairs, working, line, max_offset_px, config.max_gap_diameters);
-    candidate.rating = rate_body(candidate.body.seen, working, prior, config);
-    if (!candidate.body.seen.empty()) candidates.push_back(std::move(candidate));
-  }
-  const auto better = [](const Candidate& a, const Candidate& b) { return a.rating > b.rating; };
-  std::sort(candidates.begin(), candidates.end(), better);
-  candidates.resize(std::min(candidates.size(), kFollowedAgain));
-  for (Candidate& candidate : candidates) follow_again(candidate, pairs, rims, working, prior, max_offset_px, config);
-  const auto best = std::min_element(candidates.begin(), candidates.end(), better);
-  return best == candidates.end() ? FoundBody{} : std::move(best->body);
+  std::vector<FoundBody> bodies = glimpse_bodies(pairs, working, prior, config);
+  keep_distinct(bodies, kFollowedAgain);
+  for (FoundBody& body : bodies) follow_again(body, pairs, rims, working, prior, max_offset_px, config);
+  std::sort(bodies.begin(), bodies.end(), [](const FoundBody& a, const FoundBody& b) { return a.rating > b.rating; });
+  return bodies;
 }
 
 }  // namespace imprint

@@ -43,7 +43,7 @@ cv::Mat_<unsigned char> clean_mask(const cv::Mat& weak, const cv::Mat& strong, i
 }
 
 // Ridge points of +-gy along each column, the strongest ones. Strength is one half for a gradient of `least` plus a
-// third of what the image's strong edges have.
+// third of what the image's strong edges have, at most for twice `least`: clutter may outshine the forging by far.
 std::vector<std::vector<RimCandidate>> ridges(const cv::Mat_<float>& gy, float sign,
                                               const cv::Mat_<unsigned char>& mask, double least, int max_count) {
   std::vector<std::vector<RimCandidate>> columns(static_cast<std::size_t>(gy.cols));
@@ -64,7 +64,7 @@ std::vector<std::vector<RimCandidate>> ridges(const cv::Mat_<float>& gy, float s
   if (gradients.empty()) return columns;
   const auto strong = gradients.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(gradients.size() - 1));
   std::nth_element(gradients.begin(), strong, gradients.end());
-  const float half = static_cast<float>(least) + *strong / 3;
+  const float half = static_cast<float>(least) + std::min(*strong / 3, static_cast<float>(least));
   for (auto& column : columns) {
     for (RimCandidate& c : column) c.strength /= c.strength + half;
     if (column.size() <= static_cast<std::size_t>(max_count)) continue;

@@ -6,6 +6,8 @@
 
 #include "node/segment/axis_lines.h"
 #include "node/segment/body_search.h"
+#include "node/segment/directions.h"
+#include "node/segment/other_bodies.h"
 #include "node/segment/rim_candidates.h"
 #include "node/segment/segment_config.h"
 #include "node/segment/working_image.h"
@@ -39,6 +41,20 @@ void resample_rims(const std::vector<RimSample>& samples, double max_gap_px, Seg
   }
 }
 
+// A body and the image it was seen in.
+struct Sight {
+  FoundBody body;
+  WorkingImage working;
+};
+
+void look_closely(const WorkingImage& working, const SegmentPrior& prior, const SegmentConfig& config,
+                  std::vector<Sight>& sights) {
+  const double r = working.reduction;
+  const RimCandidates rims = find_rim_candidates(working, config);
+  const RimPairs pairs = pair_rims(working, rims, prior.diameter_min_px / r, prior.diameter_max_px / r);
+  for (FoundBody& body : find_bodies(pairs, rims, working, prior, config)) sights.push_back({std::move(body), working});
+}
+
 Segmentation describe(const BodyPath& path, const AxisLine& axis, const WorkingImage& working,
                       const SegmentConfig& config) {
   const AxisLine line = fit_axis(path, axis);
@@ -68,6 +84,28 @@ Segmentation describe(const BodyPath& path, const AxisLine& axis, const WorkingI
   const double width = path.median_width_px() * working.reduction;
   resample_rims(samples, std::max(8.0 * working.reduction, 2.0 * config.max_gap_diameters * width), out);
   return out;
+}
+
+// Whether the best body will do for a forging; if not, what is missing.
+Result<void> check_body(const FoundBody& body, const WorkingImage& working, const SegmentConfig& config) {
+  const double r = working.reduction, width = body.whole.median_width_px();
+  const auto middle =
+      body.whole.empty()
+          ? ObservedPoint{}
+          : working.observed(0.5 * (body.whole.columns.front().x_px + body.whole.columns.back().x_px), body.axis.y0_px);
+  if (body.whole.empty() || body.whole.length_px() < config.min_elongation * width)
+    return job_failed(
+        "no forging: the best body is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is needed",
+        body.whole.length_px() * r, width * r, config.min_elongation);
+  if (body.rating < config.min_score)
+    return job_failed(
+        "no forging: the best body, at ({:.0f}, {:.0f}) px and {:.0f} x {:.0f} px large, is none with a score of "
+        "{:.2f} ({:.2f} is needed): both rims seen on {:.0f} % of its length, {:.0f} % of its inside of one "
+        "brightness, "
+        "contrast {:.0f} of 255",
+        middle.x_px, middle.y_px, body.whole.length_px() * r, width * r, body.rating, config.min_score,
+        100 * body.proof.both, 100 * body.proof.filled, 255 * body.proof.contrast);
+  return {};
 }
 
 }  // namespace
@@ -104,35 +142,24 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
   if (std::min(image.cols, image.rows) < 32)
     return job_failed("no forging: the image has only {} x {} px", image.cols, image.rows);
 
-  const WorkingImage working = make_working_image(image, prior, config);
-  const double r = working.reduction;
-  const RimCandidates rims = find_rim_candidates(working, config);
-  const auto any = [](const auto& columns) {
-    return std::any_of(columns.begin(), columns.end(), [](const auto& c) { return !c.empty(); });
-  };
-  if (!any(rims.upper) && !any(rims.lower)) {
-    return job_failed("no forging: no edge along the axis direction stands out of the noise; is the exposure right?");
-  }
-  const auto pairs = pair_rims(working, rims, prior.diameter_min_px / r, prior.diameter_max_px / r);
-  if (!any(pairs.columns))
+  const ReducedImage reduced = reduce_image(image, prior, config);
+  SegmentConfig close = config;
+  close.max_tilt_deg = std::min(config.max_tilt_deg, 4.0);
+  std::vector<Sight> sights;
+  for (const Direction& direction : likely_directions(reduced, prior, config))
+    look_closely(turn_image(reduced, direction.x, direction.y), prior, close, sights);
+  if (sights.empty())
     return job_failed(
-        "no forging: edges were found, but no two of them {:.0f} to {:.0f} px apart with a {} body between",
+        "no forging: no edges stand out {:.0f} to {:.0f} px apart with a {} body between; is the exposure right?",
         prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
-
-  const FoundBody body = find_body(pairs, rims, working, prior, config);
-  if (const double width = body.seen.median_width_px();
-      body.seen.empty() || body.seen.length_px() < config.min_elongation * width)
-    return job_failed(
-        "no forging: the best body with both rims is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is "
-        "needed",
-        body.seen.length_px() * r, width * r, config.min_elongation);
-  Segmentation found = describe(body.whole, body.axis, working, config);
-  const auto with_both =
-      std::count_if(body.seen.columns.begin(), body.seen.columns.end(), [](const auto& c) { return c.pair.both; });
-  found.score = std::min(1.0, static_cast<double>(with_both) / body.whole.length_px());
-  if (found.score < config.min_score)
-    return job_failed("no forging: both rims seen on {:.0f} % of the {:.0f} px long body, {:.0f} % are needed",
-                      100 * found.score, body.whole.length_px() * r, 100 * config.min_score);
+  std::sort(sights.begin(), sights.end(), [](const Sight& a, const Sight& b) { return a.body.rating > b.body.rating; });
+  const auto best = std::find_if(sights.begin(), sights.end(), [&](const Sight& sight) {
+    return check_body(sight.body, sight.working, config).has_value();
+  });
+  if (best == sights.end()) return pass_on(check_body(sights.front().body, sights.front().working, config).error());
+  Segmentation found = describe(best->body.whole, best->body.axis, best->working, config);
+  found.score = best->body.rating;
+  found.others = find_other_bodies(best->working, best->body, prior, config);
   return found;
 }
 

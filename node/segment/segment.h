@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -22,6 +23,15 @@ struct SegmentPrior {
 
 struct SegmentConfig;  // in segment_config.h
 
+/// Something else in view that is about as bright as the forging (of a dark forging: as dark), and why it was not
+/// taken.
+struct SeenBody {
+  ObservedPoint middle;
+  double length_px = 0.0;  ///< of the smallest rectangle about it
+  double width_px = 0.0;
+  std::string why_not;
+};
+
 /// The forging, roughly: a straight line in the observed image and, at every whole px along it,
 /// where the two rims are expected. Coordinates: origin + station direction + offset normal, with the
 /// normal the direction turned by +90 deg from x to y.
@@ -32,7 +42,8 @@ struct Segmentation {
   int first_station_px = 0;            ///< station of the first element of the vectors below
   std::vector<float> upper_offset_px;  ///< expected rim with the smaller offset; NaN where none was seen
   std::vector<float> lower_offset_px;
-  double score = 0.0;  ///< how sure: share of the length with both rims, 0 to 1
+  double score = 0.0;            ///< how sure, 0 to 1: rims and inside proven, length, contrast, width and place
+  std::vector<SeenBody> others;  ///< the largest first
 };
 
 /// Finds the one forging that fits the prior, [C] 2.3.2 "Forging segmentation".

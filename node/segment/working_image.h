@@ -8,7 +8,20 @@
 
 namespace imprint {
 
-/// The image shrunk and turned so that the prior's direction runs along +x.
+/// The image shrunk; a dark forging is inverted, so it is always brighter.
+struct ReducedImage {
+  cv::Mat_<float> intensity;  ///< share of full scale
+  int reduction = 1;
+  double quantum = 1.0 / 255;  ///< one grey level, share of full scale
+};
+
+/// Shrunk by as much as leaves the narrowest forging `min_reduced_diameter_px` wide, at most by `max_reduction`.
+ReducedImage reduce_image(const cv::Mat& image, const SegmentPrior& prior, const SegmentConfig& config);
+
+/// Shrunk once more by 2.
+ReducedImage halve(const ReducedImage& reduced);
+
+/// The image shrunk and turned so that a direction runs along +x.
 struct WorkingImage {
   cv::Mat_<float> intensity;      ///< share of full scale; a dark forging is inverted, so it is always brighter
   cv::Mat_<unsigned char> valid;  ///< 255 where the camera saw something
@@ -23,6 +36,6 @@ struct WorkingImage {
   }
 };
 
-WorkingImage make_working_image(const cv::Mat& image, const SegmentPrior& prior, const SegmentConfig& config);
+WorkingImage turn_image(const ReducedImage& reduced, double direction_x, double direction_y);
 
 }  // namespace imprint

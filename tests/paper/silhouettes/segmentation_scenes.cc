@@ -127,8 +127,8 @@ class SceneMaker {
     s.scale_coverage = chance(0.3) ? 0.0 : between(0.0, low ? 0.1 : 0.25);
     scene_.backdrop.clutter = between(0.2, 1.8);
     if (dark_) {
-      scene_.backdrop.level = between(std::max(0.45, contrast + 0.04), 0.9);
-      s.level = (scene_.backdrop.level - contrast);
+      s.level = between(0.02, 0.12);  // a black tube; little light on the wall makes low contrast
+      scene_.backdrop.level = s.level + contrast;
       s.scale_coverage *= 0.2;
       scene_.backdrop.strong_level = s.level * between(0.0, 0.7);
     } else {
@@ -147,7 +147,7 @@ class SceneMaker {
     t.per_camera = 10 + random_.index(8);
     t.dot_diameter_mm = between(13, 17) * camera.distance_mm / camera.model.focal_length_px;
     t.plate_mm = 4.2 * t.dot_diameter_mm;
-    t.white_level = dark_ ? std::min(1.0, 1.1 * scene_.backdrop.level) : between(0.2, 0.45);
+    t.white_level = dark_ ? scene_.backdrop.level * between(0.8, 1.1) : between(0.2, 0.45);
   }
 
   void jaw() {

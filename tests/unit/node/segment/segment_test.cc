@@ -59,7 +59,8 @@ TEST_CASE("segment: a glowing body is found with both rims and its extent") {
   REQUIRE(found);
   CHECK(worst_rim_error(*found, body) < 3);  // the image is reduced by 3
   CHECK(std::abs(length_px(*found) - 600) < 24);
-  CHECK(found->score > 0.95);
+  CHECK(found->score > 0.7);  // all proven; its length of six widths counts 0.8
+  CHECK(found->others.empty());
   CHECK(found->direction_x > 0.999);
 }
 
@@ -77,8 +78,8 @@ TEST_CASE("segment: any orientation, both senses of the prior's direction") {
   }
 }
 
-TEST_CASE("segment: tilted against the prior") {
-  for (const double tilt : {-8.0, -5.0, 3.0, 8.0}) {
+TEST_CASE("segment: tilted against the prior by up to 30 degrees") {
+  for (const double tilt : {-30.0, -21.0, -8.0, 3.0, 12.0, 16.0, 30.0}) {
     drawn::Body body = plain_body();
     body.tilt_rad = tilt * kDegree;
     const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 3), prior(), {});
@@ -170,6 +171,51 @@ TEST_CASE("segment: a body that is wider than the rig allows is not taken") {
   CHECK(worst_rim_error(*found, body) < 4);
 }
 
+TEST_CASE("segment: of several hot bodies the one of the rig's width is taken and the others are named") {
+  drawn::Body body = plain_body();
+  body.origin = {450, 330};
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  drawn::draw_bar(image, {40, 20, 560, 200}, 170);   // wider than any diameter of the rig
+  drawn::draw_bar(image, {100, 500, 700, 45}, 150);  // narrower
+  drawn::draw_bar(image, {700, 40, 110, 100}, 150);  // of a width that fits, but no longer than wide
+  const auto found = segment_forging(drawn::expose(image, 3, 21), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 4);
+  REQUIRE(found->others.size() == 3);  // the largest first
+  CHECK(found->others[0].why_not.find("wider") != std::string::npos);
+  CHECK(found->others[0].middle.x_px == Approx(319.5).margin(4));
+  CHECK(found->others[0].middle.y_px == Approx(119.5).margin(4));
+  CHECK(found->others[0].width_px == Approx(200).margin(10));
+  CHECK(found->others[1].why_not.find("narrower") != std::string::npos);
+  CHECK(found->others[2].why_not.find("short") != std::string::npos);
+}
+
+TEST_CASE("segment: a jaw that holds an end, darker or as bright as the body, is left out") {
+  for (const float level : {60.0F, 150.0F}) {
+    drawn::Body body = plain_body();
+    cv::Mat_<float> image = drawn::draw(body, kSize);
+    drawn::draw_bar(image, {650, 190, 250, 220}, level);  // twice as wide, from station 200 on
+    const auto found = segment_forging(drawn::expose(image, 3, 22), prior(), {});
+    INFO("level " << level);
+    REQUIRE(found);
+    const double last = found->origin.x_px + found->direction_x * (found->first_station_px + length_px(*found) - 1);
+    CHECK(last == Approx(650).margin(30));  // the edge stage looks half a width about it
+  }
+}
+
+TEST_CASE("segment: clutter that outshines and touches the body does not bend its rims") {
+  drawn::Body body = plain_body();
+  body.level = 60;
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  drawn::draw_bar(image, {260, 60, 30, 190}, 240);   // stands on the upper rim
+  drawn::draw_bar(image, {600, 350, 40, 200}, 200);  // hangs on the lower rim
+  drawn::draw_bar(image, {400, 351, 120, 60}, 250);  // a window along it
+  const auto found = segment_forging(drawn::expose(image, 3, 23), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 8);  // some px are left to the search about the rim
+  CHECK(std::abs(length_px(*found) - 600) < 24);
+}
+
 TEST_CASE("segment: out of view on one side") {
   drawn::Body body = plain_body();
   body.end_px = 700;
@@ -198,6 +244,9 @@ TEST_CASE("segment: no forging is an error that says what was missing") {
     drawn::draw_bar(hall, {600, 350, 120, 100}, 255);
     CHECK_FALSE(message(drawn::expose(hall, 3, seed)).empty());
   }
+  cv::Mat_<float> bars(kSize, 20.0F);  // a grating as wide and long as a forging
+  for (int k = 0; k < 6; ++k) drawn::draw_bar(bars, {200, 250 + 18 * k, 500, 9}, 200);
+  CHECK(message(drawn::expose(bars, 3, 30)).find("score") != std::string::npos);
 }
 
 TEST_CASE("segment: the prior follows rig and pose") {
