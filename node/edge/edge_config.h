@@ -21,6 +21,7 @@ struct EdgeConfig {
   int blur_region_stations = 256;   // the blur is taken as constant over this length; ours
   double end_half_band = 0.35;      // rows on either side of the axis for the ends, share of the diameter; ours
   double end_search_px = 24.0;      // about the coarse end; ours
+  double end_haze_share = 0.5;      // of the haze that the rims show, by which an end may be off; ours
 
   [[nodiscard]] Result<void> validate() const;
 };

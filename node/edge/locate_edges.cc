@@ -8,6 +8,7 @@
 #include "node/edge/edge_config.h"
 #include "node/edge/forging_ends.h"
 #include "node/edge/rim_edges.h"
+#include "node/edge/rim_haze.h"
 #include "node/edge/silhouette_frame.h"
 
 namespace imprint {
@@ -148,6 +149,10 @@ Silhouette locate_edges(const cv::Mat& image, const Segmentation& segmentation, 
   silhouette.upper = std::move(upper_edges.points);
   silhouette.lower = std::move(lower_edges.points);
   silhouette.saturated_fraction = saturated_fraction(image, frame, upper, lower);
+  // Hot air shifts an end as a whole too, which no residual about its face shows, but the rims do.
+  const double shifted = config.end_haze_share * rim_haze_px(silhouette);
+  for (LocatedEnd* located : {&silhouette.start, &silhouette.end})
+    if (located->visible) located->sigma_px = std::hypot(located->sigma_px, shifted);
   return silhouette;
 }
 

@@ -17,7 +17,8 @@ struct StepEdge {
 };
 
 /// How far to either side of a traced edge a step of that blur (px) is fitted, where no other edge is nearer. The
-/// farther from the edge, the less does a level hold; where noise (share of the step) is the greater evil, more is read.
+/// farther from the edge, the less does a level hold; where noise (share of the step) is the greater evil, more is
+/// read.
 int fit_reach_px(double blur_px, double noise_share);
 
 /// Blur and rise of every `region_lines` traced edges, in their order: medians over their lines.

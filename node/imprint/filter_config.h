@@ -22,7 +22,7 @@ struct FilterConfig {
   int min_trusted_run = 12;          // stations; shorter trusted stretches of a rim are not trusted; ours
   double min_disagreement_px = 0.5;  // of the middle, from which the rim further in is not trusted; ours
 
-  double min_coverage = 0.08;  // share of the length with both rims trusted; ours
+  double min_coverage = 0.04;  // share of the length with both rims trusted; ours
   int min_points = 50;         // of each rim; ours
 
   [[nodiscard]] Result<void> validate() const;

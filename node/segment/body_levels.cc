@@ -32,63 +32,118 @@ std::vector<float> smoothed(const std::vector<float>& values, int half) {
   return result;
 }
 
-// The last column of the body when walking from `from` in steps of `step`. The ground is the darker of what lies beside
-// the column and what lay beside the columns before: clutter there must not hide the body's contrast. Scale leaves
-// something of a section bright; where nothing is, there is air, and what lies behind it is not the body.
-int walk(const BodyLevels& levels, int from, int step, float least_body, double width_px, double max_gap_px) {
-  constexpr float kBelow = 0.4F, kAbove = 0.6F, kMemory = 0.05F;  // of the contrast; memory of about 20 columns
-  constexpr double kReturnShare = 0.6, kAir = 0.08;
-  const int n = static_cast<int>(levels.body.size());
-  const double most_air = std::max(2.0, kAir * width_px);
-  float brightness = levels.body[static_cast<std::size_t>(from)],
-        before = levels.ground[static_cast<std::size_t>(from)];
-  int last = from, run = 0, air = 0;
-  for (int x = from; x >= 0 && x < n && std::abs(x - last) <= max_gap_px + run && air <= most_air; x += step) {
-    const auto column = static_cast<std::size_t>(x);
-    const float body = levels.body[column], ground = levels.ground[column];
-    const float contrast = brightness - std::min(ground, before), off = body - brightness;
-    air = levels.peak[column] - brightness < -0.5F * contrast ? air + 1 : 0;
-    if (body < least_body || off < -kBelow * contrast || off > kAbove * contrast) {
-      run = 0;
-      continue;
-    }
-    ++run;
-    // Behind a gap the body goes on for about as long as the gap was; a lamp does not.
-    const int gap = std::abs(x - last) - run;
-    if (run < kReturnShare * gap) continue;
-    brightness += kMemory * (body - brightness);
-    before += kMemory * (ground - before);
-    last = x;
-    run = 0;
-  }
-  return last;
+// Rows of one column inside every step of the forging.
+void gather_inside(const WorkingImage& working, const AxisLine& line, double width_px, int x,
+                   std::vector<float>& values) {
+  constexpr double kStrip = 0.3;  // of the width, to both sides of the axis
+  values.clear();
+  gather(working, x, line.y_px(x) - kStrip * width_px, line.y_px(x) + kStrip * width_px, values);
 }
+
+// Follows the body from column to column, in either direction. Its level may drift, since ends are colder. The ground
+// is the darker of what lies beside the column and what lay beside the columns before: clutter there must not hide the
+// body's contrast.
+class BodyWalk {
+ public:
+  BodyWalk(const WorkingImage& working, const AxisLine& line, double width_px, const BodyLevels& levels,
+           float least_body)
+      : working_(working), line_(line), width_px_(width_px), levels_(levels), least_body_(least_body) {}
+
+  // The last column of the body, and its brightness from `from` on. Every column speaks for the body or against it; the
+  // body ends where all of them together speak for it most. Scale speaks against it, but leaves something of a section
+  // bright, and behind it the body goes on for longer than a lamp would; behind air only what is long of itself belongs
+  // to it.
+  int last_column(int from, int step, double max_gap_px, std::vector<float>& brightness) {
+    const int n = static_cast<int>(levels_.body.size());
+    start(from);
+    const int gap = std::max(3, static_cast<int>(kGap * width_px_));
+    double sum = 0, most = 0;
+    int last = from, air = 0;
+    for (int x = from; x >= 0 && x < n && most - sum <= kAir * max_gap_px + kIsland * width_px_; x += step) {
+      const double w = worth(x);
+      brightness[static_cast<std::size_t>(x)] = brightness_;
+      sum += w;
+      air = w <= -kAir ? air + 1 : 0;
+      if (air == gap) sum -= kIsland * width_px_;
+      if (sum > most) most = sum, last = x;
+    }
+    return last;
+  }
+
+ private:
+  static constexpr double kAir = 1.2;                 // against the body: a column that shows nothing of it
+  static constexpr double kGap = 0.2, kIsland = 0.4;  // of the width: as many such columns are air; what pays for it
+  static constexpr double kScale = 0.65, kTooBright = 1.0;   // likewise: a pixel that is darker, or brighter
+  static constexpr float kDarker = 0.33F, kBrighter = 0.5F;  // of the contrast
+  static constexpr float kLost = 0.3F;  // likewise, after half a width of unsure columns: it may have become colder
+  static constexpr double kNothing = 0.15, kSurely = 0.5;  // of a column's pixels
+  static constexpr float kGroundMemory = 0.01F;            // a beam behind the body is no ground
+  static constexpr float kMemory = 0.05F;                  // of about 20 columns
+
+  void start(int from) {
+    const int half = std::max(2, static_cast<int>(0.5 * width_px_)), n = static_cast<int>(levels_.body.size());
+    values_.clear();
+    for (int x = std::max(0, from - half); x <= std::min(n - 1, from + half); ++x)
+      values_.push_back(levels_.body[static_cast<std::size_t>(x)]);
+    unsure_ = 0;
+    brightness_ = std::max(least_body_, quantile(values_, 0.5));
+    ground_ = levels_.ground[static_cast<std::size_t>(from)];
+  }
+
+  double worth(int x) {
+    gather_inside(working_, line_, width_px_, x, values_);
+    if (values_.empty()) return -kAir;
+    const float ground = std::min(levels_.ground[static_cast<std::size_t>(x)], ground_);
+    const float contrast = brightness_ - ground;
+    const float darker = kDarker + kLost * std::min(1.0F, static_cast<float>(2.0 * unsure_ / width_px_));
+    double same = 0, dark = 0, bright = 0, near = 0, sum = 0;
+    for (const float v : values_) {
+      const float off = (v - brightness_) / std::max(1e-4F, contrast);
+      (off < -darker ? dark : off > kBrighter ? bright : same) += 1;
+      if (std::abs(off) < kBrighter) near += 1, sum += v;
+    }
+    const auto count = static_cast<double>(values_.size());
+    ++unsure_;
+    if (same < kNothing * count) return -kAir;
+    if (same > kSurely * count) {
+      unsure_ = std::max(0, unsure_ - 4);
+      brightness_ += kMemory * (static_cast<float>(sum / near) - brightness_);
+      ground_ += kGroundMemory * (levels_.ground[static_cast<std::size_t>(x)] - ground_);
+    }
+    return (same - kScale * dark - kTooBright * bright) / count;
+  }
+
+  const WorkingImage& working_;
+  const AxisLine& line_;
+  double width_px_;
+  const BodyLevels& levels_;
+  float least_body_;
+  float brightness_ = 0, ground_ = 0;
+  int unsure_ = 0;  // columns that were not surely the body's, less a few for each that was
+  std::vector<float> values_;
+};
 
 }  // namespace
 
 BodyLevels levels_between(const WorkingImage& working, const AxisLine& line, double width_px, int first_x_px,
                           int last_x_px) {
-  constexpr double kStrip = 0.3;                        // of the width, to both sides of the axis: inside every step
   constexpr double kGroundFrom = 0.8, kGroundTo = 1.6;  // of the width: outside every step
   BodyLevels levels;
   levels.first_x_px = first_x_px, levels.last_x_px = last_x_px;
   levels.body.assign(static_cast<std::size_t>(working.intensity.cols), 0.0F);
-  levels.ground = levels.peak = levels.body;
-  std::vector<float> values, body, ground, peak;
+  levels.ground = levels.body;
+  std::vector<float> values, body, ground;
   for (int x = first_x_px; x <= last_x_px; ++x) {
     const double y = line.y_px(x);
-    values.clear();
-    gather(working, x, y - kStrip * width_px, y + kStrip * width_px, values);
+    gather_inside(working, line, width_px, x, values);
     body.push_back(quantile(values, 0.7));
-    peak.push_back(quantile(values, 0.92));
     values.clear();
     gather(working, x, y - kGroundTo * width_px, y - kGroundFrom * width_px, values);
     gather(working, x, y + kGroundFrom * width_px, y + kGroundTo * width_px, values);
     ground.push_back(quantile(values, 0.3));
   }
-  body = smoothed(body, 2), peak = smoothed(peak, 2), ground = smoothed(ground, 8);
+  body = smoothed(body, 2), ground = smoothed(ground, 8);
   std::copy(body.begin(), body.end(), levels.body.begin() + first_x_px);
-  std::copy(peak.begin(), peak.end(), levels.peak.begin() + first_x_px);
   std::copy(ground.begin(), ground.end(), levels.ground.begin() + first_x_px);
   return levels;
 }
@@ -96,15 +151,13 @@ BodyLevels levels_between(const WorkingImage& working, const AxisLine& line, dou
 BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, double width_px, int inside_x_px,
                           float least_body, double max_gap_px) {
   BodyLevels levels = levels_between(working, line, width_px, 0, working.intensity.cols - 1);
-  levels.first_x_px = walk(levels, inside_x_px, -1, least_body, width_px, max_gap_px);
-  levels.last_x_px = walk(levels, inside_x_px, 1, least_body, width_px, max_gap_px);
+  BodyWalk walk(working, line, width_px, levels, least_body);
   // Over scale the body is as bright as beside it.
-  for (int x = levels.first_x_px + 1; x < levels.last_x_px; ++x) {
-    auto& body = levels.body[static_cast<std::size_t>(x)];
-    const float ground = levels.ground[static_cast<std::size_t>(x)],
-                before = levels.body[static_cast<std::size_t>(x - 1)];
-    if (body - ground < 0.6F * (before - ground)) body = before;
-  }
+  std::vector<float> brightness = levels.body;
+  const int first = walk.last_column(inside_x_px, -1, max_gap_px, brightness);
+  const int last = walk.last_column(inside_x_px, 1, max_gap_px, brightness);
+  levels.first_x_px = first, levels.last_x_px = last;
+  levels.body = std::move(brightness);
   return levels;
 }
 

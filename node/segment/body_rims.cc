@@ -6,7 +6,7 @@
 namespace imprint {
 namespace {
 
-constexpr float kSame = 0.45F;     // of the contrast: still the body
+constexpr float kSame = 0.38F;     // of the contrast: as much off the body's level speaks neither for it nor against
 constexpr float kDark = 0.6F;      // a pixel of scale against one of clean steel
 constexpr float kBright = 1.5F;    // steel has no brighter pixels, but for sparks
 constexpr float kEdge = 0.06F;     // worth of an edge, of the width
@@ -28,8 +28,8 @@ void rate_column(const WorkingImage& working, int x, double axis_y, int step, fl
     const int y = from + step * k;
     rating[static_cast<std::size_t>(k)] = sum;
     if (y < 0 || y >= working.intensity.rows || !working.valid(y, x)) continue;
-    const float off = working.intensity(y, x) - body;
-    sum += off > kSame * contrast ? -kBright : off < -kSame * contrast ? -kDark : 1.0F;
+    const float off = (working.intensity(y, x) - body) / (kSame * contrast);
+    sum += std::max(1.0F - off * off, off > 0 ? -kBright : -kDark);
     ++seen;
   }
   if (seen == 0) {

@@ -30,7 +30,7 @@ double rate_body(const BodyPath& path, const BodyProof& proof, const WorkingImag
   const double z = nearest / (config.center_reach * working.shorter_side_px);
   const double solid = std::clamp((proof.filled - 0.35) / 0.35, 0.0, 1.0);
   const double by_contrast = proof.contrast / (proof.contrast + config.faint_contrast);
-  return (0.75 * proof.both + 0.25 * proof.one) * solid * by_contrast * by_length * by_width / (1 + z * z);
+  return proof.sides * solid * by_contrast * by_length * by_width / (1 + z * z);
 }
 
 // The level that a section must have to belong to the body: a beam that happens to go on where the forging ends is
@@ -100,6 +100,24 @@ void cut_ends(BodyPath& path, const BodyLevels& levels, int inside_x_px) {
   path.columns = {path.columns.begin() + ends[0], path.columns.begin() + ends[1] + 1};
 }
 
+// Cuts off what goes on behind an end without proof: on either side of `inside_x_px` the body ends where its columns
+// together speak for it most.
+void cut_unproven(BodyPath& path, const BodyProof& proof, int inside_x_px) {
+  constexpr double kNeither = 0.46;  // a column that speaks neither for the body nor against it
+  if (path.empty()) return;
+  const int n = static_cast<int>(path.columns.size());
+  const int inside = std::clamp(inside_x_px - path.columns.front().x_px, 0, n - 1);
+  int ends[2] = {inside, inside};
+  for (const int side : {0, 1}) {
+    double sum = 0, most = 0;
+    for (int i = inside; i >= 0 && i < n; i += side == 0 ? -1 : 1) {
+      sum += static_cast<double>(proof.columns[static_cast<std::size_t>(i)]) - kNeither;
+      if (sum > most) most = sum, ends[side] = i;
+    }
+  }
+  path.columns = {path.columns.begin() + ends[0], path.columns.begin() + ends[1] + 1};
+}
+
 // The body about its own axis, then once more with its brightness known.
 void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& rims, const WorkingImage& working,
                   const SegmentPrior& prior, double max_offset_px, const SegmentConfig& config) {
@@ -116,17 +134,36 @@ void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& r
   body.axis = fit_axis(body.seen, body.axis);
   const double width = body.seen.median_width_px();
   const float least_body = least_body_level(body.seen, working, config);
-  // From a column that surely belongs to the body, as near to its middle as there is one.
+  // From a column that surely belongs to the body, and not to a jaw: as near to its middle as a bright one is.
+  std::vector<double> bodies;
+  for (const auto& c : body.seen.columns) bodies.push_back(c.pair.body);
+  const double usual = median_of(std::move(bodies));
   int inside = body.seen.columns.front().x_px, nearest = working.intensity.cols;
   const int middle = body.seen.columns[body.seen.columns.size() / 2].x_px;
   for (const auto& c : body.seen.columns)
-    if (c.pair.both && c.pair.body >= least_body && std::abs(c.x_px - middle) < nearest)
+    if (c.pair.both && c.pair.body >= std::max<double>(least_body, usual) && std::abs(c.x_px - middle) < nearest)
       nearest = std::abs(c.x_px - middle), inside = c.x_px;
-  const BodyLevels levels =
-      measure_levels(working, body.axis, width, inside, least_body, config.max_gap_diameters * width);
-  body.whole = trace_rims(working, body.axis, levels, rims, width, 0.4 * pairs.min_width_px, 0.6 * pairs.max_width_px);
-  cut_ends(body.whole, levels, inside);
-  body.proof = prove_body(body.whole, working, levels);
+  // What was seen may have been a part of the body, or have had a wrong rim: the whole tells where the axis is.
+  constexpr int kPasses = 3;
+  constexpr double kAxisHolds = 0.05;  // of the width
+  constexpr float kUnproven = 0.05F;   // weight of a column without both rims
+  BodyLevels levels;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    levels = measure_levels(working, body.axis, width, inside, least_body, config.max_gap_diameters * width);
+    body.whole =
+        trace_rims(working, body.axis, levels, rims, width, 0.4 * pairs.min_width_px, 0.6 * pairs.max_width_px);
+    cut_ends(body.whole, levels, inside);
+    cut_unproven(body.whole, prove_body(body.whole, working, levels), inside);
+    body.proof = prove_body(body.whole, working, levels);
+    if (body.whole.empty()) break;
+    for (auto& column : body.whole.columns) column.pair.weight = column.pair.both ? 1.0F : kUnproven;
+    const AxisLine refined = fit_axis(body.whole, body.axis);
+    const double first = body.whole.columns.front().x_px, last = body.whole.columns.back().x_px;
+    const double moved = std::max(std::abs(refined.y_px(first) - body.axis.y_px(first)),
+                                  std::abs(refined.y_px(last) - body.axis.y_px(last)));
+    if (moved < kAxisHolds * width) break;
+    body.axis = refined;
+  }
   body.rating = rate_body(body.whole, body.proof, working, prior, config);
 }
 

@@ -152,7 +152,10 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
     return job_failed(
         "no forging: no edges stand out {:.0f} to {:.0f} px apart with a {} body between; is the exposure right?",
         prior.diameter_min_px, prior.diameter_max_px, prior.polarity == Polarity::bright ? "bright" : "dark");
-  std::sort(sights.begin(), sights.end(), [](const Sight& a, const Sight& b) { return a.body.rating > b.body.rating; });
+  // Of a body and a part of it, the part may look purer.
+  const auto worth = [](const FoundBody& body) { return body.rating * std::sqrt(body.whole.length_px()); };
+  std::sort(sights.begin(), sights.end(),
+            [&](const Sight& a, const Sight& b) { return worth(a.body) > worth(b.body); });
   const auto best = std::find_if(sights.begin(), sights.end(), [&](const Sight& sight) {
     return check_body(sight.body, sight.working, config).has_value();
   });

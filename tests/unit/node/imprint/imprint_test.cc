@@ -248,7 +248,7 @@ TEST_CASE("imprint: too little left is an error that names what was found and ne
   for (const EdgeMethod method : {EdgeMethod::best, EdgeMethod::uniform}) {
     const auto result = filter_silhouette(apart, method, {});
     REQUIRE_FALSE(result);
-    CHECK(result.error().message.find("8 %") != std::string::npos);
+    CHECK(result.error().message.find("4 %") != std::string::npos);
   }
   FilteredSilhouette empty;
   Imprint imprint;
