@@ -18,12 +18,15 @@ void add_line_options(CLI::App& command, LineOptions& options) {
   command.add_option("--connect", options.connect, "where fusion's router listens")->capture_default_str();
   command.add_option("--site", options.site, "as in the configs")->capture_default_str();
   command.add_option("--line", options.line, "as in the configs")->capture_default_str();
+  command
+      .add_option("--identity", options.identity, "folder with your certificate, for tls/ endpoints (docs/security.md)")
+      ->envname("IMPRINT_IDENTITY");
 }
 
 Result<LineLink> LineLink::open(const LineOptions& options) {
   auto keys = Keys::of(options.site, options.line);
   if (!keys) return pass_on(keys.error());
-  auto transport = open_zenoh({.connect = {options.connect}, .tool = true});
+  auto transport = open_zenoh({.connect = {options.connect}, .tool = true, .identity = options.identity});
   if (!transport) return pass_on(transport.error());
   return LineLink(options, std::move(*keys), std::move(*transport));
 }

@@ -19,6 +19,7 @@ struct LineOptions {
   std::string connect = "tcp/127.0.0.1:7447";
   std::string site = "plant";
   std::string line = "L1";
+  std::string identity;  // folder of `imprint certs issue`; empty: no TLS
 };
 
 void add_line_options(CLI::App& command, LineOptions& options);

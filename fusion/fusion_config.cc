@@ -13,6 +13,8 @@ std::string without_key(const std::string& message) {
   return colon == std::string::npos ? message : message.substr(colon + 2);
 }
 
+bool is_tls(const std::string& endpoint) { return endpoint.starts_with("tls/"); }
+
 }  // namespace
 
 Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const toml::table& table) {
@@ -20,7 +22,8 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   TomlReader read(path, table);
   read.only({"fusion.site", "fusion.line", "fusion.rig", "fusion.database", "fusion.result_dir", "fusion.deadline_s",
              "fusion.max_spread_s", "fusion.max_clock_offset_s", "fusion.method", "fusion.geometry", "fusion.log_level",
-             "zenoh.connect", "zenoh.listen", "page.address", "page.port"});
+             "zenoh.connect", "zenoh.listen", "zenoh.identity", "zenoh.insecure", "zenoh.access", "page.address",
+             "page.port"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
@@ -34,6 +37,10 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
       geometry_method_of(read_choice(read, "fusion.geometry", kGeometryMethods, std::string(name_of(config.geometry))));
   config.log_level = read_choice(read, "fusion.log_level", kLogLevels, config.log_level);
   config.zenoh = read_zenoh_section(read, config.zenoh);
+  config.access = read.path("zenoh.access", config.access);
+  if (config.access.empty() && std::ranges::any_of(config.zenoh.listen, is_tls)) {
+    read.fault("zenoh.access", "expected the plant's access.json: a router on TLS must know who may do what");
+  }
   config.page.address = read.string("page.address", config.page.address);
   const std::int64_t port = read.integer("page.port", config.page.port);
   if (port < 0 || port > 65535) read.fault("page.port", fmt::format("expected 0 to 65535, found {}", port));
@@ -54,13 +61,14 @@ std::string to_toml(const FusionConfig& config) {
   return fmt::format(
       "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmax_spread_s = {}\n"
       "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n"
-      "[zenoh]\nlisten = {}\nconnect = {}\n\n[page]\naddress = {}\nport = {}\n",
+      "[zenoh]\n{}{}\n[page]\naddress = {}\nport = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
       toml_number(config.assembler.deadline_s), toml_number(config.assembler.max_spread_s),
       toml_number(config.assembler.max_clock_offset_s), toml_text(config.method), toml_text(name_of(config.geometry)),
-      toml_text(config.log_level), toml_list(config.zenoh.listen), toml_list(config.zenoh.connect),
+      toml_text(config.log_level), zenoh_to_toml(config.zenoh),
+      config.access.empty() ? "" : fmt::format("access = {}\n", toml_text(config.access.string())),
       toml_text(config.page.address), config.page.port);
 }
 

@@ -24,6 +24,7 @@ struct FusionConfig {
   std::string log_level = "info";
   AssemblerConfig assembler;
   ZenohConfig zenoh{.connect = {}, .listen = {"tcp/127.0.0.1:7447"}, .router = true};
+  std::filesystem::path access;  // who may do what at this router: access.json of `imprint certs`; empty: everybody all
   PageConfig page;
 };
 

@@ -1,7 +1,9 @@
 #include <iostream>
 
+#include "fusion/access_file.h"
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_service.h"
+#include "fusion/peer_log.h"
 #include "fusion/serve/page_server.h"
 #include "fusion/store/session_store.h"
 #include "lib/daemon/program.h"
@@ -12,20 +14,27 @@
 namespace imprint {
 namespace {
 
-constexpr auto kIdleWait = std::chrono::milliseconds(60'000);
+constexpr auto kIdleWait = std::chrono::milliseconds(1000);
 
-// Until told to stop: the watchdog as long as the worker gets on.
-void attend(const FusionService& service, StopSignal& stop) {
+enum class Ended { stopped, access_changed };
+
+// Until told to stop, or the access list is another: the watchdog as long as the worker gets on.
+Ended attend(const FusionService& service, AccessFile& access, StopSignal& stop) {
   const auto period = watchdog_period();
+  const auto wait = std::min(period.value_or(kIdleWait), kIdleWait);
   LoopWatchdog watchdog([&] { return service.turns(); });
   bool hung = false;
-  while (!stop.wait_for(period.value_or(kIdleWait))) {
-    if (!period) continue;
+  auto watchdog_due = std::chrono::steady_clock::now() + period.value_or(kIdleWait);
+  while (!stop.wait_for(wait)) {
+    if (access.changed()) return Ended::access_changed;
+    if (!period || std::chrono::steady_clock::now() < watchdog_due) continue;
+    watchdog_due += *period;
     const bool turned = watchdog.attend();
     if (!turned && !hung)
       spdlog::error("the worker has not turned for {} ms; systemd is not told that all is well", period->count());
     hung = !turned;
   }
+  return Ended::stopped;
 }
 
 // A folder, or a name that is free.
@@ -34,6 +43,32 @@ Result<void> check_result_dir(const FusionConfig& config) {
   if (config.result_dir.empty() || std::filesystem::is_directory(config.result_dir, ignored)) return {};
   if (!std::filesystem::exists(config.result_dir, ignored)) return {};
   return invalid_input("fusion.result_dir: {}: expected a folder, found a file", config.result_dir.string());
+}
+
+// One life of the connections. Only a new session takes new access rules; nodes keep what they send meanwhile.
+Result<Ended> serve(const FusionConfig& config, const Rig& rig, AccessFile& access, SessionStore& store,
+                    LineBoard& board, StopSignal& stop) {
+  ZenohConfig zenoh = config.zenoh;
+  auto rules = access.rules();
+  if (!rules) return pass_on(rules.error());
+  zenoh.access = std::move(*rules);
+  const auto peers = std::make_shared<PeerLog>(access.list(), board);
+  if (!zenoh.listen.empty()) zenoh.on_peer = [peers](const PeerNotice& notice) { peers->note(notice); };
+  auto transport = open_zenoh(zenoh);
+  if (!transport) return pass_on(transport.error());
+  FusionService service(config, rig, **transport, store, board,
+                        [geometry = config.geometry](const auto& observations, const ForgingSpec& forging,
+                                                     std::string session, std::string method) {
+                          return fuse(observations, forging, std::move(session), std::move(method), geometry);
+                        });
+  if (auto started = service.start(); !started) return pass_on(started.error());
+  spdlog::info("fusion of {}/{} ready, {} cameras", config.site, config.line, rig.cameras.size());
+  notify_ready("fusion ready");
+  const Ended ended = attend(service, access, stop);
+  if (ended == Ended::stopped) notify_stopping();
+  service.stop();
+  for (const CameraModel& camera : rig.cameras) board.set_alive(camera.id, false);  // who is let in again says so
+  return ended;
 }
 
 Result<void> run(const ProgramOptions& options) {
@@ -49,6 +84,8 @@ Result<void> run(const ProgramOptions& options) {
   const auto rig = read_rig(config->rig);
   if (!rig) return pass_on(rig.error());
   if (auto checked = check_result_dir(*config); !checked) return checked;
+  AccessFile access(config->access);
+  if (auto rules = access.rules(); !rules) return pass_on(rules.error());
   if (options.check) {
     if (auto checked = SessionStore::check(config->database); !checked) return checked;
     std::cout << options.config.string() << ": OK\n";
@@ -65,20 +102,13 @@ Result<void> run(const ProgramOptions& options) {
                   std::chrono::steady_clock::now());
   const auto page = PageServer::start(config->page, board, **store);
   if (!page) return pass_on(page.error());
-  auto transport = open_zenoh(config->zenoh);
-  if (!transport) return pass_on(transport.error());
-  FusionService service(*config, *rig, **transport, **store, board,
-                        [geometry = config->geometry](const auto& observations, const ForgingSpec& forging,
-                                                      std::string session, std::string method) {
-                          return fuse(observations, forging, std::move(session), std::move(method), geometry);
-                        });
-  if (auto started = service.start(); !started) return started;
-  spdlog::info("fusion of {}/{} ready, {} cameras, page http://{}:{}/", config->site, config->line, camera_ids.size(),
-               config->page.address, (*page)->port());
-  notify_ready("fusion ready");
-  attend(service, stop);
-  notify_stopping();
-  service.stop();
+  spdlog::info("page http://{}:{}/", config->page.address, (*page)->port());
+  while (true) {
+    const auto ended = serve(*config, *rig, access, **store, board, stop);
+    if (!ended) return pass_on(ended.error());
+    if (*ended == Ended::stopped) break;
+    spdlog::info("{}: changed; connections are made anew by it", config->access.string());
+  }
   spdlog::info("fusion stopped");
   return {};
 }

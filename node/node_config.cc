@@ -50,6 +50,8 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
              "exposure.max_step",
              "zenoh.connect",
              "zenoh.listen",
+             "zenoh.identity",
+             "zenoh.insecure",
              "health.period_s",
              "node.data_dir",
              "spool.max_mb",
@@ -89,14 +91,13 @@ std::string to_toml(const NodeConfig& config) {
       "[node]\nsite = {}\nline = {}\ncamera_id = {}\nrig = {}\nmethod = {}\nlog_level = {}\n"
       "data_dir = {}\n\n[spool]\nmax_mb = {}\nretry_s = {}\n\n[capture]\nsource = {}\npath = {}\n\n"
       "[exposure]\nauto = {}\nmin_us = {}\nmax_us = {}\nmax_gain_db = {}\ntarget_level = {}\nmax_step = {}\n\n"
-      "[zenoh]\nconnect = {}\nlisten = {}\n\n[health]\nperiod_s = {}\n",
+      "[zenoh]\n{}\n[health]\nperiod_s = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.camera_id), toml_text(config.rig.string()),
       toml_text(config.method), toml_text(config.log_level), toml_text(config.data_dir.string()), config.spool_max_mb,
       toml_number(config.retry_s), toml_text(config.capture_source), toml_text(config.capture_path.string()),
       config.exposure.automatic, toml_number(config.exposure.min_time_us), toml_number(config.exposure.max_time_us),
       toml_number(config.exposure.max_gain_db), toml_number(config.exposure.target_level),
-      toml_number(config.exposure.max_step), toml_list(config.zenoh.connect), toml_list(config.zenoh.listen),
-      toml_number(config.health_period_s));
+      toml_number(config.exposure.max_step), zenoh_to_toml(config.zenoh), toml_number(config.health_period_s));
 }
 
 }  // namespace imprint

@@ -104,7 +104,7 @@ LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_i
     : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
   for (const std::string& id : camera_ids) cameras_[id];
   for (const char* counter : {"imprints", "repeated", "surplus", "reordered", "late", "refused", "malformed", "missed",
-                              "dropped", "results"}) {
+                              "dropped", "denied", "results"}) {
     counters_[counter] = 0;
   }
 }

@@ -72,7 +72,17 @@ ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults) {
       }
     }
   }
+  config.identity = read.path("zenoh.identity", defaults.identity);
+  config.insecure = read.boolean("zenoh.insecure", defaults.insecure);
+  if (const auto checked = check_zenoh(config); !checked && !read.error()) read.fault("zenoh", checked.error().message);
   return config;
+}
+
+std::string zenoh_to_toml(const ZenohConfig& config) {
+  return fmt::format("connect = {}\nlisten = {}\n{}insecure = {}\n", toml_list(config.connect),
+                     toml_list(config.listen),
+                     config.identity.empty() ? "" : fmt::format("identity = {}\n", toml_text(config.identity.string())),
+                     config.insecure);
 }
 
 std::string read_choice(TomlReader& read, std::string_view key, std::span<const std::string_view> choices,

@@ -36,8 +36,11 @@ Result<toml::table> read_program_config(const ProgramOptions& options);
 /// An id (site, line, camera) that becomes a chunk of a key: `check_id` of lib/wire/keys.h.
 std::string read_id(TomlReader& read, std::string_view key, std::optional<std::string> fallback);
 
-/// `zenoh.connect` and `zenoh.listen`; an endpoint reads "tcp/<address>:<port>" (tcp, udp or tls).
+/// `zenoh.connect` and `zenoh.listen`, an endpoint reads "tls/<address>:<port>" (tcp, udp or tls); `zenoh.identity`,
+/// `zenoh.insecure`.
 ZenohConfig read_zenoh_section(TomlReader& read, const ZenohConfig& defaults);
+/// The same keys in the file's own form.
+std::string zenoh_to_toml(const ZenohConfig& config);
 
 /// One of a few words.
 std::string read_choice(TomlReader& read, std::string_view key, std::span<const std::string_view> choices,

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -78,12 +79,39 @@ class Transport {
                                           std::chrono::milliseconds timeout) = 0;
 };
 
+/// What the holder of a certificate may do at a router. Key expressions; nothing else is let through.
+struct AccessRule {
+  std::string name;                    ///< common name of the certificate
+  std::vector<std::string> send{};     ///< may publish, answer queries and announce itself on these
+  std::vector<std::string> receive{};  ///< may subscribe to these and see who announces itself there
+  std::vector<std::string> ask{};      ///< may send queries to these
+};
+
+/// What a router tells of those who connect to it.
+struct PeerNotice {
+  enum class Kind { connected, gone, denied, handshake_refused };
+  Kind kind = Kind::connected;
+  std::string name;    ///< common name of its certificate; empty: it has none, or it is not known
+  std::string detail;  ///< its address; of `denied` what it tried; of `handshake_refused` why
+};
+/// Called on a thread of the transport, perhaps once more after the transport is closed; never blocks.
+using PeerCallback = std::function<void(const PeerNotice&)>;
+
 struct ZenohConfig {
-  std::vector<std::string> connect{};  ///< endpoints to reach, e.g. "tcp/10.0.0.5:7447"; kept trying for ever
+  std::vector<std::string> connect{};  ///< endpoints to reach, e.g. "tls/10.0.0.5:7447"; kept trying for ever
   std::vector<std::string> listen{};   ///< endpoints to open; none by default
   bool router = false;                 ///< route for others (the fusion node)
   bool tool = false;                   ///< a command for a person: needs a router there, and says so when there is none
+  /// Folder with ca.pem, cert.pem and key.pem: who this program is to others over TLS, and who signs for them.
+  std::filesystem::path identity{};
+  bool insecure = false;  ///< tcp and udp beyond this machine too: whoever reaches the router can be any camera
+  std::vector<AccessRule> access{};  ///< of a router that listens on TLS; empty: whoever has a certificate may do all
+  PeerCallback on_peer{};
 };
+
+/// Whether the endpoints are well-formed and as safe as the config wants them: over a network only TLS, with an
+/// identity whose three files can be read, unless `insecure`. Fails (invalid_input) naming endpoint or file.
+Result<void> check_zenoh(const ZenohConfig& config);
 
 /// Opens at once and connects when the other side is there, now or later; a tool instead fails (job_failed)
 /// when no router is reached within 3 s. A router carries between itself, nodes and tools, but not from one

@@ -1,16 +1,16 @@
 #include <algorithm>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <regex>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "lib/transport/callback_gate.h"
 #include "lib/transport/key_expression.h"
 #include "lib/transport/transport.h"
 #include "lib/transport/zenoh_bridge/handlers.h"
+#include "lib/transport/zenoh_session_json.h"
 #include "zenoh_bridge.h"
 
 namespace imprint {
@@ -146,6 +146,40 @@ class RequestForwarder final : public bridge::RequestHandler {
   QueryCallback on_query_;
 };
 
+/// Names those who connect, by the certificates they came with.
+class PeerReporter final : public bridge::PeerHandler {
+ public:
+  explicit PeerReporter(PeerCallback on_peer) : on_peer_(std::move(on_peer)) {}
+
+  void on_link(bool opened, rust::Str id, rust::Str name, rust::Str address) const override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (names_.size() >= kMaxRemembered) names_.clear();
+      if (opened) names_[std::string(id)] = std::string(name);
+    }
+    on_peer_({opened ? PeerNotice::Kind::connected : PeerNotice::Kind::gone, std::string(name), std::string(address)});
+  }
+  void on_denied(rust::Str id, rust::Str action, rust::Str key) const override {
+    on_peer_({PeerNotice::Kind::denied, name_of(std::string(id)), std::string(action) + " on " + std::string(key)});
+  }
+  void on_handshake_refused(rust::Str reason) const override {
+    on_peer_({PeerNotice::Kind::handshake_refused, "", std::string(reason)});
+  }
+
+ private:
+  static constexpr std::size_t kMaxRemembered = 1024;
+
+  std::string name_of(const std::string& id) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = names_.find(id);
+    return found == names_.end() ? "" : found->second;
+  }
+
+  PeerCallback on_peer_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::string, std::string> names_;  // by session id
+};
+
 /// The session lives until the last of what was declared on it is gone, in whatever order they go.
 using SharedSession = std::shared_ptr<rust::Box<bridge::Session>>;
 
@@ -259,74 +293,31 @@ class ZenohTransport final : public Transport {
   SharedSession session_;
 };
 
-Result<void> check_endpoint(std::string_view side, const std::string& endpoint) {
-  const auto slash = endpoint.find('/');
-  const std::string_view protocol = std::string_view(endpoint).substr(0, slash);
-  const bool known = protocol == "tcp" || protocol == "tls" || protocol == "udp";
-  if (slash == std::string::npos || !known || endpoint.find(':', slash) == std::string::npos)
-    return invalid_input("{} endpoint '{}': expected tcp/HOST:PORT, tls/HOST:PORT or udp/HOST:PORT", side, endpoint);
-  return {};
-}
-
-Result<void> check_config(const ZenohConfig& config) {
-  for (const auto& endpoint : config.connect)
-    if (auto checked = check_endpoint("connect", endpoint); !checked) return checked;
-  for (const auto& endpoint : config.listen)
-    if (auto checked = check_endpoint("listen", endpoint); !checked) return checked;
-  if (config.tool && (config.router || config.connect.empty()))
-    return invalid_input("Zenoh session of a tool: expected an endpoint to connect to, and no router, found {}",
-                         config.router ? "a router" : "no endpoint");
-  return {};
-}
-
 std::string joined(const std::vector<std::string>& endpoints) {
   std::string text;
   for (const auto& endpoint : endpoints) text += (text.empty() ? "" : ", ") + endpoint;
   return text;
 }
 
-/// How long a full link may hold up an imprint before it is dropped: bursts pass, a camera hardly waits.
-constexpr int kWaitBeforeDropUs = 20000;
-/// How long a node waits for its connection before it goes on without: spares it losing its first messages.
-constexpr int kConnectDelayMs = 500;
-/// How long a tool tries to reach a router.
-constexpr int kToolTimeoutMs = 3000;
-
-const char* mode_of(const ZenohConfig& config) {
-  if (config.router) return "router";
-  return config.tool ? "client" : "peer";
-}
-
-/// The session's configuration as Zenoh reads it. Peer and router mode open at once and go on trying to
-/// connect; client mode waits for its router. No multicast: only the endpoints named are ever spoken to.
-/// No time stamps: messages carry their own sensor time.
-std::string session_config(const ZenohConfig& config) {
-  nlohmann::json json;
-  json["mode"] = mode_of(config);
-  json["connect"]["endpoints"] = config.connect;
-  json["connect"]["timeout_ms"] = config.tool ? kToolTimeoutMs : -1;
-  json["connect"]["exit_on_failure"] = config.tool;
-  json["connect"]["retry"] = {{"period_init_ms", 200}, {"period_max_ms", 2000}, {"period_increase_factor", 2}};
-  json["listen"] = {{"endpoints", config.listen}, {"timeout_ms", 0}, {"exit_on_failure", true}};
-  json["scouting"]["multicast"]["enabled"] = false;
-  json["scouting"]["delay"] = config.router ? 0 : kConnectDelayMs;
-  json["timestamping"]["enabled"] = false;
-  json["transport"]["link"]["tx"]["queue"]["congestion_control"]["drop"]["wait_before_drop"] = kWaitBeforeDropUs;
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Transport>> open_zenoh(const ZenohConfig& config) {
-  if (auto checked = check_config(config); !checked) return pass_on(checked.error());
+  if (auto checked = check_zenoh(config); !checked) return pass_on(checked.error());
   try {
     static std::once_flag log_once;
     std::call_once(log_once, [] { bridge::log_to_stderr("error"); });
-    return std::make_unique<ZenohTransport>(bridge::open_session(session_config(config)));
+    auto session = bridge::open_session(zenoh_session_json(config));
+    if (config.on_peer) {
+      const auto reporter = std::make_shared<PeerReporter>(config.on_peer);
+      bridge::report_refusals_to(reporter);
+      session->watch_links(reporter);
+    }
+    return std::make_unique<ZenohTransport>(std::move(session));
   } catch (const rust::Error& error) {
     if (config.tool)
-      return job_failed("connect endpoint {}: no router reached within {} s: is imprint-fusion running there?",
-                        joined(config.connect), kToolTimeoutMs / 1000);
+      return job_failed("connect endpoint {}: no router reached within {} s: is imprint-fusion running there{}?",
+                        joined(config.connect), kToolTimeoutMs / 1000,
+                        config.identity.empty() ? "" : ", and of the plant that signed " + config.identity.string());
     const std::string reason = reason_of(error);
     const bool taken = reason.find("already in use") != std::string::npos;
     return job_failed(

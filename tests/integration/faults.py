@@ -117,9 +117,10 @@ class CabledLine(ReadyLine):
         self.endpoint = f"tcp/{cable.here}:{free_port()}"
 
     def start_all(self):
-        self.start_fusion("--set", f'zenoh.listen=["{self.endpoint}"]')
+        self.start_fusion("--set", f'zenoh.listen=["{self.endpoint}"]', "--set", "zenoh.insecure=true")
         for camera in CAMERAS:
-            self.start(camera, self.cable.inside(*self.node_command(camera, zenoh__connect=f'["{self.endpoint}"]')))
+            self.start(camera, self.cable.inside(*self.node_command(camera, zenoh__connect=f'["{self.endpoint}"]',
+                                                                    zenoh__insecure="true")))
         self.wait_alive(*CAMERAS)
 
 

@@ -22,6 +22,17 @@ struct LivenessHandler {
   virtual void on_change(rust::Str key, bool alive) const = 0;
 };
 
+/// Who connects to a session, and what is refused to whom.
+struct PeerHandler {
+  virtual ~PeerHandler() = default;
+  /// `name`: the common name of its certificate, empty without one; `id`: of the other session.
+  virtual void on_link(bool opened, rust::Str id, rust::Str name, rust::Str address) const = 0;
+  /// A session tried what its rules do not allow: `action` as Zenoh names it, e.g. "Put".
+  virtual void on_denied(rust::Str id, rust::Str action, rust::Str key) const = 0;
+  /// A connection ended in its TLS handshake.
+  virtual void on_handshake_refused(rust::Str reason) const = 0;
+};
+
 struct RequestHandler {
   virtual ~RequestHandler() = default;
   virtual void on_request(rust::Box<Request> request) const = 0;

@@ -1,9 +1,12 @@
 //! Zenoh as lib/transport needs it, for C++ through `cxx`: sessions, publishers and subscribers with
 //! history, liveliness, queries. Every failure is a `Result` here and a `rust::Error` there.
 
+mod refusals;
+
 use std::{io::IsTerminal, time::Duration};
 
 use cxx::SharedPtr;
+use tracing_subscriber::{layer::SubscriberExt, EnvFilter, Layer};
 use zenoh::{
     bytes::Encoding,
     handlers::Callback,
@@ -56,6 +59,10 @@ mod ffi {
         fn on_miss(self: &SampleHandler, source: &str, count: u32) -> Result<()>;
         type LivenessHandler;
         fn on_change(self: &LivenessHandler, key: &str, alive: bool) -> Result<()>;
+        type PeerHandler;
+        fn on_link(self: &PeerHandler, opened: bool, id: &str, name: &str, address: &str) -> Result<()>;
+        fn on_denied(self: &PeerHandler, id: &str, action: &str, key: &str) -> Result<()>;
+        fn on_handshake_refused(self: &PeerHandler, reason: &str) -> Result<()>;
         type RequestHandler;
         fn on_request(self: &RequestHandler, request: Box<Request>) -> Result<()>;
     }
@@ -63,9 +70,13 @@ mod ffi {
     extern "Rust" {
         /// Zenoh's own messages go to stderr; `RUST_LOG` overrides the level.
         fn log_to_stderr(level: &str);
+        /// Who is told what sessions of this program refuse; the last one given.
+        fn report_refusals_to(handler: SharedPtr<PeerHandler>);
 
         type Session;
         fn open_session(config_json: &str) -> Result<Box<Session>>;
+        /// Tells of every link of the session, those there are first, until the session closes.
+        fn watch_links(self: &Session, handler: SharedPtr<PeerHandler>) -> Result<()>;
         fn declare_publisher(self: &Session, key: &str, setup: &PublisherSetup) -> Result<Box<Publisher>>;
         fn declare_subscriber(
             self: &Session,
@@ -109,6 +120,8 @@ unsafe impl Send for ffi::SampleHandler {}
 unsafe impl Sync for ffi::SampleHandler {}
 unsafe impl Send for ffi::LivenessHandler {}
 unsafe impl Sync for ffi::LivenessHandler {}
+unsafe impl Send for ffi::PeerHandler {}
+unsafe impl Sync for ffi::PeerHandler {}
 unsafe impl Send for ffi::RequestHandler {}
 unsafe impl Sync for ffi::RequestHandler {}
 
@@ -132,7 +145,14 @@ fn log_to_stderr(level: &str) {
     if !std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
         std::env::set_var("NO_COLOR", "1");
     }
-    zenoh::init_log_from_env_or(level);
+    let spoken = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let to_stderr = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(spoken);
+    let subscriber = tracing_subscriber::registry().with(to_stderr).with(refusals::layer());
+    let _ = tracing::subscriber::set_global_default(subscriber); // fails when there is one: then that one stays
+}
+
+fn report_refusals_to(handler: SharedPtr<ffi::PeerHandler>) {
+    refusals::report_to(handler);
 }
 
 fn open_session(config_json: &str) -> Outcome<Box<Session>> {
@@ -147,6 +167,23 @@ fn report(what: &str, outcome: Result<(), cxx::Exception>) {
 }
 
 impl Session {
+    fn watch_links(&self, handler: SharedPtr<ffi::PeerHandler>) -> Outcome<()> {
+        self.0
+            .info()
+            .link_events_listener()
+            .history(true)
+            .callback(move |event| {
+                let link = event.link();
+                let opened = event.kind() == SampleKind::Put;
+                let name = link.auth_identifier().unwrap_or_default();
+                let (id, address) = (link.zid().to_string(), link.dst().to_string());
+                report("on_link", handler.on_link(opened, &id, name, &address));
+            })
+            .background()
+            .wait()?;
+        Ok(())
+    }
+
     fn declare_publisher(&self, key: &str, setup: &ffi::PublisherSetup) -> Outcome<Box<Publisher>> {
         let congestion = if setup.block { CongestionControl::Block } else { CongestionControl::Drop };
         let mut builder = self

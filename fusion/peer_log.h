@@ -1,0 +1,32 @@
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "fusion/serve/line_board.h"
+#include "lib/access/access_list.h"
+#include "lib/transport/transport.h"
+
+namespace imprint {
+
+/// Logs who comes, goes and is refused, by the name of its certificate, and counts what was refused. The same refusal
+/// is logged once a minute: a flood must not fill the journal.
+class PeerLog {
+ public:
+  PeerLog(AccessList list, LineBoard& board) : list_(std::move(list)), board_(board) {}
+
+  void note(const PeerNotice& notice);
+
+ private:
+  void refused(const std::string& what);
+  bool is_new(const std::string& what);  ///< it was not logged within the last minute
+
+  AccessList list_;
+  LineBoard& board_;
+  std::mutex mutex_;
+  std::map<std::string, std::chrono::steady_clock::time_point> logged_;
+};
+
+}  // namespace imprint
