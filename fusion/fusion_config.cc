@@ -13,6 +13,30 @@ std::string without_key(const std::string& message) {
   return colon == std::string::npos ? message : message.substr(colon + 2);
 }
 
+std::filesystem::path audit_beside(std::filesystem::path database) { return database += ".audit.jsonl"; }
+
+HealthLimits read_alarms(TomlReader& read) {
+  HealthLimits limits;
+  limits.max_temperature_c = read.number("alarm.max_temperature_c", limits.max_temperature_c);
+  limits.max_reprojection_px = read.number("alarm.max_reprojection_px", limits.max_reprojection_px);
+  limits.max_blur_px = read.number("alarm.max_blur_px", limits.max_blur_px);
+  limits.min_contrast = read.number("alarm.min_contrast", limits.min_contrast);
+  limits.min_storage_mb = read.number("alarm.min_storage_mb", limits.min_storage_mb);
+  limits.hysteresis = read.number("alarm.hysteresis", limits.hysteresis);
+  limits.records = static_cast<int>(std::clamp<std::int64_t>(read.integer("alarm.records", limits.records), 0, 1000));
+  if (const auto valid = limits.validate(); !valid) read.fault("alarm", valid.error().message);
+  return limits;
+}
+
+std::string to_toml(const HealthLimits& limits) {
+  return fmt::format(
+      "[alarm]\nmax_temperature_c = {}\nmax_reprojection_px = {}\nmax_blur_px = {}\nmin_contrast = {}\n"
+      "min_storage_mb = {}\nhysteresis = {}\nrecords = {}\n",
+      toml_number(limits.max_temperature_c), toml_number(limits.max_reprojection_px), toml_number(limits.max_blur_px),
+      toml_number(limits.min_contrast), toml_number(limits.min_storage_mb), toml_number(limits.hysteresis),
+      limits.records);
+}
+
 bool is_tls(const std::string& endpoint) { return endpoint.starts_with("tls/"); }
 
 }  // namespace
@@ -20,10 +44,34 @@ bool is_tls(const std::string& endpoint) { return endpoint.starts_with("tls/"); 
 Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const toml::table& table) {
   FusionConfig config;
   TomlReader read(path, table);
-  read.only({"fusion.site", "fusion.line", "fusion.rig", "fusion.database", "fusion.result_dir", "fusion.deadline_s",
-             "fusion.max_spread_s", "fusion.max_clock_offset_s", "fusion.method", "fusion.geometry", "fusion.log_level",
-             "zenoh.connect", "zenoh.listen", "zenoh.identity", "zenoh.insecure", "zenoh.access", "page.address",
-             "page.port"});
+  read.only({"fusion.site",
+             "fusion.line",
+             "fusion.rig",
+             "fusion.database",
+             "fusion.result_dir",
+             "fusion.deadline_s",
+             "fusion.max_spread_s",
+             "fusion.max_clock_offset_s",
+             "fusion.method",
+             "fusion.geometry",
+             "fusion.log_level",
+             "zenoh.connect",
+             "zenoh.listen",
+             "zenoh.identity",
+             "zenoh.insecure",
+             "zenoh.access",
+             "page.address",
+             "page.port",
+             "page.users",
+             "page.insecure",
+             "page.audit",
+             "alarm.max_temperature_c",
+             "alarm.max_reprojection_px",
+             "alarm.max_blur_px",
+             "alarm.min_contrast",
+             "alarm.min_storage_mb",
+             "alarm.hysteresis",
+             "alarm.records"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
@@ -49,6 +97,11 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
     const std::string& message = valid.error().message;
     read.fault("fusion." + message.substr(0, message.find(':')), without_key(message));
   }
+  config.page.users = read.path("page.users", config.page.users);
+  config.page.insecure = read.boolean("page.insecure", config.page.insecure);
+  config.page.audit = read.path("page.audit", audit_beside(config.database));
+  if (!config.page.is_local()) config.page.identity = config.zenoh.identity;
+  config.alarms = read_alarms(read);
   if (const auto valid = config.page.validate(); !valid) read.fault("page.address", without_key(valid.error().message));
   if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
     read.fault("zenoh.listen", "no endpoint here nor in zenoh.connect: no camera could reach this program");
@@ -61,7 +114,7 @@ std::string to_toml(const FusionConfig& config) {
   return fmt::format(
       "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmax_spread_s = {}\n"
       "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n"
-      "[zenoh]\n{}{}\n[page]\naddress = {}\nport = {}\n",
+      "[zenoh]\n{}{}\n[page]\naddress = {}\nport = {}\n{}insecure = {}\naudit = {}\n\n{}",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
@@ -69,7 +122,9 @@ std::string to_toml(const FusionConfig& config) {
       toml_number(config.assembler.max_clock_offset_s), toml_text(config.method), toml_text(name_of(config.geometry)),
       toml_text(config.log_level), zenoh_to_toml(config.zenoh),
       config.access.empty() ? "" : fmt::format("access = {}\n", toml_text(config.access.string())),
-      toml_text(config.page.address), config.page.port);
+      toml_text(config.page.address), config.page.port,
+      config.page.users.empty() ? "" : fmt::format("users = {}\n", toml_text(config.page.users.string())),
+      config.page.insecure, toml_text(config.page.audit.string()), to_toml(config.alarms));
 }
 
 }  // namespace imprint

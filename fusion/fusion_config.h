@@ -26,6 +26,7 @@ struct FusionConfig {
   ZenohConfig zenoh{.connect = {}, .listen = {"tcp/127.0.0.1:7447"}, .router = true};
   std::filesystem::path access;  // who may do what at this router: access.json of `imprint certs`; empty: everybody all
   PageConfig page;
+  HealthLimits alarms;
 };
 
 /// Reads the table of `fusion.toml`; `path` is what relative paths and messages refer to.

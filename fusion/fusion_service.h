@@ -44,6 +44,8 @@ class FusionService {
 
   /// Takes up the unfinished sessions of the store and begins to receive.
   Result<void> start();
+  /// Makes all cameras take an observation, as `imprint trigger` does; it comes back to this node as from anybody else.
+  Result<void> fire(const Trigger& trigger) { return trigger_publisher_->put(encode_trigger(trigger)); }
   /// Stores what has been received so far, then ends.
   void stop();
   /// Grows with every turn of the worker's loop and with every message, write that is tried again and session in it;

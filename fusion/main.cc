@@ -47,7 +47,7 @@ Result<void> check_result_dir(const FusionConfig& config) {
 
 // One life of the connections. Only a new session takes new access rules; nodes keep what they send meanwhile.
 Result<Ended> serve(const FusionConfig& config, const Rig& rig, AccessFile& access, SessionStore& store,
-                    LineBoard& board, StopSignal& stop) {
+                    LineBoard& board, LineControl& control, StopSignal& stop) {
   ZenohConfig zenoh = config.zenoh;
   auto rules = access.rules();
   if (!rules) return pass_on(rules.error());
@@ -64,8 +64,10 @@ Result<Ended> serve(const FusionConfig& config, const Rig& rig, AccessFile& acce
   if (auto started = service.start(); !started) return pass_on(started.error());
   spdlog::info("fusion of {}/{} ready, {} cameras", config.site, config.line, rig.cameras.size());
   notify_ready("fusion ready");
+  control.connect([&](const Trigger& trigger) { return service.fire(trigger); });
   const Ended ended = attend(service, access, stop);
   if (ended == Ended::stopped) notify_stopping();
+  control.disconnect();
   service.stop();
   for (const CameraModel& camera : rig.cameras) board.set_alive(camera.id, false);  // who is let in again says so
   return ended;
@@ -99,12 +101,14 @@ Result<void> run(const ProgramOptions& options) {
   std::vector<std::string> camera_ids;
   for (const CameraModel& camera : rig->cameras) camera_ids.push_back(camera.id);
   LineBoard board({config->site, config->line, config->method, IMPRINT_VERSION}, camera_ids,
-                  std::chrono::steady_clock::now());
-  const auto page = PageServer::start(config->page, board, **store);
+                  std::chrono::steady_clock::now(), config->alarms);
+  LineControl control;
+  const auto page = PageServer::start(config->page, board, **store, control);
   if (!page) return pass_on(page.error());
-  spdlog::info("page http://{}:{}/", config->page.address, (*page)->port());
+  spdlog::info("page {}://{}:{}/", config->page.identity.empty() ? "http" : "https", config->page.address,
+               (*page)->port());
   while (true) {
-    const auto ended = serve(*config, *rig, access, **store, board, stop);
+    const auto ended = serve(*config, *rig, access, **store, board, control, stop);
     if (!ended) return pass_on(ended.error());
     if (*ended == Ended::stopped) break;
     spdlog::info("{}: changed; connections are made anew by it", config->access.string());

@@ -19,8 +19,14 @@ double age_s(LineBoard::Time then, LineBoard::Time now) {
 // 64 bits do not fit the numbers of every JSON reader.
 std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
+json known(const std::optional<double>& value) { return value ? json(*value) : json(); }
+
 json health_json(const Health& health, double age) {
-  return {{"time", utc_text(health.time_ns)},
+  return {{"housing_temperature_c", known(health.housing_temperature_c)},
+          {"sensor_temperature_c", known(health.sensor_temperature_c)},
+          {"storage_free_mb", known(health.storage_free_mb)},
+          {"clock_offset_s", known(health.clock_offset_s)},
+          {"time", utc_text(health.time_ns)},
           {"age_s", age},
           {"boot_id", hex(health.boot_id)},
           {"sequence", health.sequence},
@@ -100,8 +106,8 @@ json to_json(const SessionSummary& summary) {
   return document;
 }
 
-LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started)
-    : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids) {
+LineBoard::LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started, HealthLimits limits)
+    : identity_(std::move(identity)), started_(started), camera_ids_(camera_ids), health_alarms_(limits) {
   for (const std::string& id : camera_ids) cameras_[id];
   for (const char* counter : {"imprints", "repeated", "surplus", "reordered", "late", "refused", "malformed", "missed",
                               "dropped", "denied", "results"}) {
@@ -119,12 +125,12 @@ std::optional<std::string> LineBoard::set_health(const Health& health, Time now)
   const auto camera = cameras_.find(health.camera_id);
   if (camera == cameras_.end()) return std::nullopt;
   auto raised = watch_for_namesakes(camera->second, health, now);
-  const std::string exposure = "exposure_" + health.camera_id;
-  if (health.exposure_alarm.empty()) {
-    alarms_.erase(exposure);
-  } else {
-    alarms_[exposure] = fmt::format("camera {}: {}", health.camera_id, health.exposure_alarm);
-  }
+  const std::int64_t now_ns = wall_clock_ns();
+  alarms_.set(
+      "exposure_" + health.camera_id,
+      health.exposure_alarm.empty() ? "" : fmt::format("camera {}: {}", health.camera_id, health.exposure_alarm),
+      now_ns);
+  for (const HealthAlarms::Change& change : health_alarms_.note(health)) alarms_.set(change.name, change.text, now_ns);
   camera->second.health = health;
   camera->second.health_at = now;
   return raised;
@@ -137,19 +143,21 @@ std::optional<std::string> LineBoard::watch_for_namesakes(Camera& camera, const 
   const bool came_back = after_another && known != camera.boots.end() && !late;
   const bool is_new = came_back && !camera.shared_at;
   const std::string name = "two_nodes_" + health.camera_id;
+  std::string alarm;
   if (came_back) {
     camera.shared_at = now;
-    alarms_[name] = fmt::format(
+    alarm = fmt::format(
         "camera {0}: two nodes send under this name (boot ids {1} and {2}); stop one of them or give it its own "
         "node.camera_id",
         health.camera_id, hex(camera.health->boot_id), hex(health.boot_id));
+    alarms_.set(name, alarm, wall_clock_ns());
   } else if (camera.shared_at && now - *camera.shared_at >= kNamesakesGone) {
     camera.shared_at.reset();
-    alarms_.erase(name);
+    alarms_.set(name, "", wall_clock_ns());
   }
   if (known == camera.boots.end() && camera.boots.size() >= kMaxBoots) camera.boots.clear();
   if (!late) camera.boots[health.boot_id] = health.time_ns;
-  return is_new ? std::optional(alarms_[name]) : std::nullopt;
+  return is_new ? std::optional(alarm) : std::nullopt;
 }
 
 void LineBoard::note_imprint(const Imprint& imprint, Time now) {
@@ -201,16 +209,17 @@ void LineBoard::count(const std::string& counter, std::uint64_t by) {
 
 void LineBoard::set_alarm(const std::string& name, const std::string& text) {
   const std::lock_guard lock(mutex_);
-  if (text.empty()) {
-    alarms_.erase(name);
-  } else {
-    alarms_[name] = text;
-  }
+  alarms_.set(name, text, wall_clock_ns());
+}
+
+bool LineBoard::acknowledge(const std::string& name, const std::string& who) {
+  const std::lock_guard lock(mutex_);
+  return alarms_.acknowledge(name, who, wall_clock_ns());
 }
 
 bool LineBoard::has_alarm() const {
   const std::lock_guard lock(mutex_);
-  return !alarms_.empty();
+  return alarms_.any();
 }
 
 json LineBoard::status(Time now) const {
@@ -232,12 +241,10 @@ json LineBoard::status(Time now) const {
                                          {"waiting", state.waiting}});
     }
   }
-  json alarms = json::array();
-  for (const auto& [name, text] : alarms_) alarms.push_back({{"name", name}, {"text", text}});
   return {{"schema", "imprint.status/1"},  {"site", identity_.site},        {"line", identity_.line},
           {"method", identity_.method},    {"version", identity_.version},  {"uptime_s", age_s(started_, now)},
           {"cameras", std::move(cameras)}, {"session", std::move(session)}, {"last_result", last_result_},
-          {"counters", counters_},         {"alarms", std::move(alarms)}};
+          {"counters", counters_},         {"alarms", alarms_.standing()},  {"ended_alarms", alarms_.ended()}};
 }
 
 json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {

@@ -11,6 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "fusion/receive/observation_assembler.h"
+#include "fusion/serve/alarm_list.h"
+#include "fusion/serve/health_alarms.h"
 #include "fusion/store/session_store.h"
 #include "lib/imprint/imprint.h"
 #include "lib/wire/wire.h"
@@ -30,7 +32,7 @@ struct CurrentSession {
 };
 
 /// What is known of the line at this moment, for whoever asks: the page, `imprint status`. Safe to use from several
-/// threads; knows no clock.
+/// threads; knows the clock only for when an alarm began.
 class LineBoard {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -42,7 +44,7 @@ class LineBoard {
     std::string version;
   };
 
-  LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started);
+  LineBoard(Identity identity, const std::vector<std::string>& camera_ids, Time started, HealthLimits limits = {});
 
   void set_alive(const std::string& camera_id, bool alive);
   /// Two nodes that send under one camera's name make the alarm `two_nodes_<camera>`: a boot id that comes back after
@@ -62,6 +64,8 @@ class LineBoard {
   void count(const std::string& counter, std::uint64_t by = 1);
   /// A condition that needs a person; an empty text ends it.
   void set_alarm(const std::string& name, const std::string& text);
+  /// False when there is no such alarm that nobody has acknowledged yet.
+  bool acknowledge(const std::string& name, const std::string& who);
 
   /// `imprint.status/1` (docs/configuration.md).
   [[nodiscard]] nlohmann::json status(Time now) const;
@@ -93,7 +97,8 @@ class LineBoard {
   std::optional<CurrentSession> session_;
   nlohmann::json last_result_;
   std::map<std::string, std::uint64_t> counters_;
-  std::map<std::string, std::string> alarms_;
+  AlarmList alarms_;
+  HealthAlarms health_alarms_;
 };
 
 }  // namespace imprint

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include <google/protobuf/stubs/logging.h>
@@ -21,6 +22,15 @@ constexpr std::size_t kMaxErrorBytes = 80;
 constexpr std::size_t kMaxAlarmBytes = 120;
 constexpr std::size_t kMaxVersionBytes = 32;
 constexpr std::size_t kMaxResultErrorBytes = 1000;
+
+// Rounded, and held within what the field can carry.
+template <class Integer>
+Integer whole(double value) {
+  using Limits = std::numeric_limits<Integer>;
+  if (!(value > static_cast<double>(Limits::min()))) return Limits::min();
+  if (value >= static_cast<double>(Limits::max())) return Limits::max();
+  return static_cast<Integer>(std::llround(value));
+}
 
 }  // namespace
 
@@ -71,6 +81,11 @@ std::vector<std::uint8_t> encode_health(const Health& health) {
   message.set_body_level(wire_float(health.body_level));
   message.set_exposure_us(wire_float(health.exposure_us));
   message.set_gain_db(wire_float(health.gain_db));
+  if (health.housing_temperature_c)
+    message.set_housing_temperature_c(whole<std::int32_t>(*health.housing_temperature_c));
+  if (health.sensor_temperature_c) message.set_sensor_temperature_c(whole<std::int32_t>(*health.sensor_temperature_c));
+  if (health.storage_free_mb) message.set_storage_free_mb(whole<std::uint32_t>(*health.storage_free_mb));
+  if (health.clock_offset_s) message.set_clock_offset_ms(whole<std::int64_t>(1000.0 * *health.clock_offset_s));
   message.set_exposure_alarm(wire_line(health.exposure_alarm, kMaxAlarmBytes));
   return bytes_of(message);
 }
@@ -104,6 +119,10 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes) {
   health.body_level = message->body_level();
   health.exposure_us = message->exposure_us();
   health.gain_db = message->gain_db();
+  if (message->has_housing_temperature_c()) health.housing_temperature_c = message->housing_temperature_c();
+  if (message->has_sensor_temperature_c()) health.sensor_temperature_c = message->sensor_temperature_c();
+  if (message->has_storage_free_mb()) health.storage_free_mb = message->storage_free_mb();
+  if (message->has_clock_offset_ms()) health.clock_offset_s = 0.001 * static_cast<double>(message->clock_offset_ms());
   health.exposure_alarm = message->exposure_alarm();
   return health;
 }

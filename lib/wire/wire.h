@@ -57,6 +57,10 @@ struct Health {
   double body_level = 0.0;
   double exposure_us = 0.0;  ///< 0: the frame source does not say
   double gain_db = 0.0;
+  std::optional<double> housing_temperature_c{};
+  std::optional<double> sensor_temperature_c{};
+  std::optional<double> storage_free_mb{};  ///< on the partition where imprints wait
+  std::optional<double> clock_offset_s{};   ///< the node's clock minus fusion's, as fusion has told
   std::string exposure_alarm{};  ///< one line, cut to 120 bytes; empty: the forging is held out of saturation
 };
 std::vector<std::uint8_t> encode_health(const Health& health);

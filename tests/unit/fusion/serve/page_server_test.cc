@@ -15,11 +15,12 @@ struct Server {
   TemporaryFolder folder;
   LineBoard board{{"plant", "L1", "best", "0.1.0"}, {"cam1"}, std::chrono::steady_clock::now()};
   std::unique_ptr<SessionStore> store = *SessionStore::open(folder / "imprint.db");
+  LineControl control;
   std::unique_ptr<PageServer> page;
 
   Server() {
     REQUIRE(store->put_result({"S-1", true, "", R"({"length_mm": 1500.5, "observations": []})", 0, 0}));
-    auto started = PageServer::start({.address = "127.0.0.1", .port = 0}, board, *store);
+    auto started = PageServer::start({.address = "127.0.0.1", .port = 0}, board, *store, control);
     REQUIRE(started);
     page = std::move(*started);
   }
@@ -87,9 +88,9 @@ TEST_CASE("page: an alarm turns the health check to 503") {
 }
 
 TEST_CASE("page: a port that is taken is said so, with the port") {
-  const Server server;
-  const auto second =
-      PageServer::start({.address = "127.0.0.1", .port = server.page->port()}, server.board, *server.store);
+  Server server;
+  const auto second = PageServer::start({.address = "127.0.0.1", .port = server.page->port()}, server.board,
+                                        *server.store, server.control);
   REQUIRE_FALSE(second);
   REQUIRE(second.error().exit_status() == 1);
   REQUIRE(second.error().message.find(std::to_string(server.page->port())) != std::string::npos);
