@@ -37,6 +37,28 @@ std::string to_toml(const HealthLimits& limits) {
       limits.records);
 }
 
+PlcConfig read_plc(TomlReader& read) {
+  PlcConfig plc;
+  plc.input = read.path("plc.input", plc.input);
+  plc.session = read.string("plc.session", plc.session);
+  plc.observations =
+      static_cast<int>(std::clamp<std::int64_t>(read.integer("plc.observations", plc.observations), 0, 1000));
+  plc.rotation_step_deg = read.number("plc.rotation_step_deg", plc.rotation_step_deg);
+  plc.debounce_ms = read.number("plc.debounce_ms", plc.debounce_ms);
+  plc.new_session_s = read.number("plc.new_session_s", plc.new_session_s);
+  if (const auto valid = plc.validate(); !valid) read.fault("plc", valid.error().message);
+  return plc;
+}
+
+std::string to_toml(const PlcConfig& plc) {
+  if (plc.input.empty()) return {};
+  return fmt::format(
+      "\n[plc]\ninput = {}\nsession = {}\nobservations = {}\nrotation_step_deg = {}\ndebounce_ms = {}\nnew_session_s = "
+      "{}\n",
+      toml_text(plc.input.string()), toml_text(plc.session), plc.observations, toml_number(plc.rotation_step_deg),
+      toml_number(plc.debounce_ms), toml_number(plc.new_session_s));
+}
+
 bool is_tls(const std::string& endpoint) { return endpoint.starts_with("tls/"); }
 
 }  // namespace
@@ -71,7 +93,13 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
              "alarm.min_contrast",
              "alarm.min_storage_mb",
              "alarm.hysteresis",
-             "alarm.records"});
+             "alarm.records",
+             "plc.input",
+             "plc.session",
+             "plc.observations",
+             "plc.rotation_step_deg",
+             "plc.debounce_ms",
+             "plc.new_session_s"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
@@ -102,6 +130,7 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   config.page.audit = read.path("page.audit", audit_beside(config.database));
   if (!config.page.is_local()) config.page.identity = config.zenoh.identity;
   config.alarms = read_alarms(read);
+  config.plc = read_plc(read);
   if (const auto valid = config.page.validate(); !valid) read.fault("page.address", without_key(valid.error().message));
   if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
     read.fault("zenoh.listen", "no endpoint here nor in zenoh.connect: no camera could reach this program");
@@ -124,7 +153,7 @@ std::string to_toml(const FusionConfig& config) {
       config.access.empty() ? "" : fmt::format("access = {}\n", toml_text(config.access.string())),
       toml_text(config.page.address), config.page.port,
       config.page.users.empty() ? "" : fmt::format("users = {}\n", toml_text(config.page.users.string())),
-      config.page.insecure, toml_text(config.page.audit.string()), to_toml(config.alarms));
+      config.page.insecure, toml_text(config.page.audit.string()), to_toml(config.alarms) + to_toml(config.plc));
 }
 
 }  // namespace imprint

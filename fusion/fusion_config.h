@@ -4,6 +4,7 @@
 #include <string>
 
 #include "fusion/geometry_method.h"
+#include "fusion/plc_input.h"
 #include "fusion/receive/observation_assembler.h"
 #include "fusion/serve/page_server.h"
 #include "lib/config/toml_file.h"
@@ -27,6 +28,7 @@ struct FusionConfig {
   std::filesystem::path access;  // who may do what at this router: access.json of `imprint certs`; empty: everybody all
   PageConfig page;
   HealthLimits alarms;
+  PlcConfig plc;
 };
 
 /// Reads the table of `fusion.toml`; `path` is what relative paths and messages refer to.

@@ -10,6 +10,8 @@
 #include "lib/daemon/stop_signal.h"
 #include "lib/daemon/systemd_notice.h"
 #include "lib/log/log.h"
+#include "lib/service/document_desk.h"
+#include "lib/service/log_document.h"
 
 namespace imprint {
 namespace {
@@ -64,6 +66,10 @@ Result<Ended> serve(const FusionConfig& config, const Rig& rig, AccessFile& acce
   if (auto started = service.start(); !started) return pass_on(started.error());
   spdlog::info("fusion of {}/{} ready, {} cameras", config.site, config.line, rig.cameras.size());
   notify_ready("fusion ready");
+  const auto keys = Keys::of(config.site, config.line);
+  if (!keys) return pass_on(keys.error());
+  const auto desk = DocumentDesk::open(**transport, {{keys->fusion_service("log"), log_document}});
+  if (!desk) return pass_on(desk.error());
   control.connect([&](const Trigger& trigger) { return service.fire(trigger); });
   const Ended ended = attend(service, access, stop);
   if (ended == Ended::stopped) notify_stopping();
@@ -107,6 +113,12 @@ Result<void> run(const ProgramOptions& options) {
   if (!page) return pass_on(page.error());
   spdlog::info("page {}://{}:{}/", config->page.identity.empty() ? "http" : "https", config->page.address,
                (*page)->port());
+  std::unique_ptr<PlcInput> plc;
+  if (!config->plc.input.empty()) {
+    auto started = PlcInput::start(config->plc, control);
+    if (!started) return pass_on(started.error());
+    plc = std::move(*started);
+  }
   while (true) {
     const auto ended = serve(*config, *rig, access, **store, board, control, stop);
     if (!ended) return pass_on(ended.error());

@@ -5,6 +5,7 @@
 
 #include "lib/daemon/program.h"
 #include "node/capture/frame_source.h"
+#include "node/service/thermometer.h"
 
 namespace imprint {
 namespace {
@@ -27,6 +28,12 @@ ExposureConfig read_exposure(TomlReader& read) {
   config.max_step = read.number("exposure.max_step", config.max_step);
   if (const auto valid = config.validate(); !valid) read.fault("exposure", valid.error().message);
   return config;
+}
+
+std::string read_thermometer(TomlReader& read, std::string_view key) {
+  std::string source = read.string(key, "");
+  if (const auto opened = Thermometer::open(source); !opened) read.fault(key, opened.error().message);
+  return source;
 }
 
 }  // namespace
@@ -53,6 +60,8 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
              "zenoh.identity",
              "zenoh.insecure",
              "health.period_s",
+             "health.housing_temperature",
+             "health.sensor_temperature",
              "node.data_dir",
              "spool.max_mb",
              "spool.retry_s"});
@@ -70,6 +79,8 @@ Result<NodeConfig> read_node_config(const std::filesystem::path& path, const tom
   if (!(config.health_period_s >= 0.1 && config.health_period_s <= 3600.0)) {
     read.fault("health.period_s", fmt::format("expected 0.1 to 3600 s, found {}", config.health_period_s));
   }
+  config.housing_temperature = read_thermometer(read, "health.housing_temperature");
+  config.sensor_temperature = read_thermometer(read, "health.sensor_temperature");
   config.data_dir = read.path("node.data_dir", std::filesystem::absolute(path).parent_path() / "imprint-data");
   config.spool_max_mb = read.integer("spool.max_mb", config.spool_max_mb);
   if (config.spool_max_mb < 1 || config.spool_max_mb > 1'000'000) {
@@ -91,13 +102,14 @@ std::string to_toml(const NodeConfig& config) {
       "[node]\nsite = {}\nline = {}\ncamera_id = {}\nrig = {}\nmethod = {}\nlog_level = {}\n"
       "data_dir = {}\n\n[spool]\nmax_mb = {}\nretry_s = {}\n\n[capture]\nsource = {}\npath = {}\n\n"
       "[exposure]\nauto = {}\nmin_us = {}\nmax_us = {}\nmax_gain_db = {}\ntarget_level = {}\nmax_step = {}\n\n"
-      "[zenoh]\n{}\n[health]\nperiod_s = {}\n",
+      "[zenoh]\n{}\n[health]\nperiod_s = {}\nhousing_temperature = {}\nsensor_temperature = {}\n",
       toml_text(config.site), toml_text(config.line), toml_text(config.camera_id), toml_text(config.rig.string()),
       toml_text(config.method), toml_text(config.log_level), toml_text(config.data_dir.string()), config.spool_max_mb,
       toml_number(config.retry_s), toml_text(config.capture_source), toml_text(config.capture_path.string()),
       config.exposure.automatic, toml_number(config.exposure.min_time_us), toml_number(config.exposure.max_time_us),
       toml_number(config.exposure.max_gain_db), toml_number(config.exposure.target_level),
-      toml_number(config.exposure.max_step), zenoh_to_toml(config.zenoh), toml_number(config.health_period_s));
+      toml_number(config.exposure.max_step), zenoh_to_toml(config.zenoh), toml_number(config.health_period_s),
+      toml_text(config.housing_temperature), toml_text(config.sensor_temperature));
 }
 
 }  // namespace imprint

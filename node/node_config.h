@@ -24,6 +24,8 @@ struct NodeConfig {
   ExposureConfig exposure;
   ZenohConfig zenoh{.connect = {"tcp/127.0.0.1:7447"}, .listen = {}, .router = false};
   double health_period_s = 5.0;
+  std::string housing_temperature;  // where it is read: hwmon:CHIP/tempN, file:PATH, simulated; empty: not
+  std::string sensor_temperature;   // of the image sensor, likewise
   std::filesystem::path data_dir;   // imprints wait below it for fusion's receipt; empty: in memory alone
   std::int64_t spool_max_mb = 256;  // of imprints that wait, then the oldest end; ours: 65,000 imprints
   double retry_s = 5.0;             // an imprint without a receipt for so long is sent again

@@ -46,6 +46,8 @@ Result<void> NodeService::start() {
   const auto keys = Keys::of(config_.site, config_.line);
   if (!keys) return pass_on(keys.error());
   health_.boot_id = make_boot_id();
+  housing_ = Thermometer::open(config_.housing_temperature).value_or(Thermometer{});
+  sensor_ = Thermometer::open(config_.sensor_temperature).value_or(Thermometer{});
   auto spool = ImprintSpool::open(config_.data_dir.empty() ? config_.data_dir : config_.data_dir / config_.camera_id,
                                   static_cast<std::size_t>(config_.spool_max_mb) << 20U);
   if (!spool) return pass_on(spool.error());
@@ -221,12 +223,23 @@ void NodeService::note(const Imprint& imprint) {
   send_health();
 }
 
+void NodeService::read_board() {
+  health_.housing_temperature_c = housing_.read();
+  health_.sensor_temperature_c = sensor_.read();
+  health_.clock_offset_s = clock_ ? std::optional(1e-9 * static_cast<double>(clock_->offset_ns())) : std::nullopt;
+  health_.storage_free_mb.reset();
+  std::error_code failed;
+  const auto space = std::filesystem::space(config_.data_dir, failed);
+  if (!config_.data_dir.empty() && !failed) health_.storage_free_mb = 1e-6 * static_cast<double>(space.available);
+}
+
 void NodeService::send_health() {
   if (!courier_ || !health_publisher_) return;
   {
     const std::lock_guard lock(health_mutex_);
     health_.time_ns = wall_clock_ns();
     health_.sequence = courier_->sequence();
+    read_board();
     if (auto sent = health_publisher_->put(encode_health(health_)); !sent)
       spdlog::warn("health not sent: {}", sent.error().message);
   }

@@ -21,6 +21,7 @@
 #include "node/node_pipeline.h"
 #include "node/publish/clock_answer.h"
 #include "node/publish/imprint_courier.h"
+#include "node/service/thermometer.h"
 
 namespace imprint {
 
@@ -60,6 +61,7 @@ class NodeService {
   /// Sets the exposure of the next frame by what this one showed, and says where that is not possible.
   void control_exposure(const Frame& frame, Imprint& imprint);
   void note(const Imprint& imprint);
+  void read_board();  // into the health record; with its lock held
 
   NodeConfig config_;
   FrameSource& source_;
@@ -73,6 +75,8 @@ class NodeService {
   std::mutex health_mutex_;  // guards the health record and its publisher
   std::unique_ptr<Publisher> health_publisher_;
   Health health_;
+  Thermometer housing_;
+  Thermometer sensor_;
 
   std::vector<std::unique_ptr<Declaration>> declarations_;
   std::mutex stop_mutex_;

@@ -353,8 +353,9 @@ class MemoryTransport final : public Transport {
     return declaration(bus_->add_watch(key, std::move(on_change)));
   }
 
+  using Transport::get;
   Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
-                                  std::chrono::milliseconds timeout) override {
+                                  std::chrono::milliseconds timeout, Traffic) override {
     const auto mark = selector.find('?');
     const std::string key = selector.substr(0, mark);
     if (auto checked = check_key(key, true); !checked) return pass_on(checked.error());

@@ -74,9 +74,14 @@ class Transport {
   virtual Result<std::unique_ptr<Declaration>> answer(const std::string& key, QueryCallback on_query) = 0;
   virtual Result<std::unique_ptr<Declaration>> announce(const std::string& key) = 0;  ///< liveliness token
   virtual Result<std::unique_ptr<Declaration>> watch_liveness(const std::string& key, LivenessCallback on_change) = 0;
-  /// All replies to a query within the timeout; an error reply is an Error. Blocks: never from a callback.
+  /// All replies to a query within the timeout; an error reply is an Error. Replies travel as the query does. Blocks:
+  /// never from a callback.
   virtual Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
-                                          std::chrono::milliseconds timeout) = 0;
+                                          std::chrono::milliseconds timeout, Traffic traffic) = 0;
+  Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
+                                  std::chrono::milliseconds timeout) {
+    return get(selector, payload, timeout, Traffic::command);
+  }
 };
 
 /// What the holder of a certificate may do at a router. Key expressions; nothing else is let through.

@@ -258,14 +258,16 @@ class ZenohTransport final : public Transport {
     });
   }
 
+  using Transport::get;
   Result<std::vector<Sample>> get(const std::string& selector, std::span<const std::uint8_t> payload,
-                                  std::chrono::milliseconds timeout) override {
+                                  std::chrono::milliseconds timeout, Traffic traffic) override {
     const std::string key = selector.substr(0, selector.find('?'));
     if (auto checked = check_key(key, true); !checked) return pass_on(checked.error());
     try {
       std::vector<Sample> samples;
       const auto wait_ms = static_cast<std::uint64_t>(std::max<std::int64_t>(timeout.count(), 0));
-      for (const auto& reply : (*session_)->get(selector, slice(payload), wait_ms)) {
+      for (const auto& reply :
+           (*session_)->get(selector, slice(payload), wait_ms, setup_of({.traffic = traffic, .history = 0}))) {
         if (reply.timed_out) continue;
         if (!reply.ok)
           return job_failed("query '{}': {}", selector, std::string(reply.payload.begin(), reply.payload.end()));

@@ -107,6 +107,17 @@ struct ClockReading {
 std::vector<std::uint8_t> encode_clock_reading(const ClockReading& reading);
 Result<ClockReading> decode_clock_reading(std::span<const std::uint8_t> bytes);
 
+/// A piece of a document that is too long for one message.
+struct Chunk {
+  std::uint64_t ticket = 0;       ///< of the document
+  std::uint32_t total_bytes = 0;  ///< of the document
+  std::uint32_t offset = 0;       ///< of this piece
+  std::vector<std::uint8_t> data;
+};
+inline constexpr std::size_t kMaxChunkBytes = 1000;  ///< of data
+std::vector<std::uint8_t> encode_chunk(const Chunk& chunk);
+Result<Chunk> decode_chunk(std::span<const std::uint8_t> bytes);
+
 /// A `Result` message: the JSON document of `imprint.result/1` with its session and whether it is the last.
 struct ResultMessage {
   std::string session;

@@ -32,6 +32,7 @@ no_namespaces = refusal("ip", "netns", "add", "imprint-probe")
 if not no_namespaces:
     subprocess.run(["ip", "netns", "del", "imprint-probe"], check=True)
 no_loss = no_namespaces or refusal("nft", "list", "tables")
+no_shaping = no_namespaces or refusal("tc", "qdisc", "show")
 no_mount = refusal("mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", "/mnt")
 if not no_mount:
     subprocess.run(["umount", "/mnt"], check=True)
@@ -48,6 +49,10 @@ class FaultTest(unittest.TestCase):
     @unittest.skipIf(no_loss, f"needs network namespaces and nft: {no_loss}")
     def test_nothing_is_lost_with_a_fifth_of_the_packets(self):
         faults.packet_loss(work, ready, percent=20, observations=3)
+
+    @unittest.skipIf(no_shaping, f"needs network namespaces and tc: {no_shaping}")
+    def test_imprints_and_peeks_pass_a_link_of_64_kbit(self):
+        faults.thin_link(work, ready, minutes=1, live_s=10)
 
     @unittest.skipIf(no_mount, f"needs a small disk: {no_mount}")
     def test_a_node_with_a_full_disk_goes_on_measuring_with_an_alarm(self):

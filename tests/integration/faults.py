@@ -1,9 +1,12 @@
 """The faults a plant has, each done to a line of real processes. Every function fails on a loss and gives its figures."""
 import contextlib
+import datetime
 import itertools
+import json
 import os
 import pathlib
 import random
+import re
 import signal
 import statistics
 import subprocess
@@ -108,6 +111,13 @@ class Cable:
         subprocess.run(self.inside("nft", "-f", "-"), input=rules, text=True, check=True, capture_output=True)
 
 
+    def limit(self, rate):
+        """Lets through only so much each way, e.g. 64kbit; what does not fit waits for up to 4 s."""
+        shape = ["qdisc", "add", "dev", None, "root", "tbf", "rate", rate, "burst", "2000", "latency", "4s"]
+        for prefix, device in (([], self.name), (["ip", "netns", "exec", self.name], "eth0")):
+            subprocess.run([*prefix, "tc", *(part or device for part in shape)], check=True, capture_output=True)
+
+
 class CabledLine(ReadyLine):
     """Fusion here, the nodes at the other end of the cable."""
 
@@ -116,11 +126,11 @@ class CabledLine(ReadyLine):
         self.cable = cable
         self.endpoint = f"tcp/{cable.here}:{free_port()}"
 
-    def start_all(self):
+    def start_all(self, **settings):
         self.start_fusion("--set", f'zenoh.listen=["{self.endpoint}"]', "--set", "zenoh.insecure=true")
         for camera in CAMERAS:
             self.start(camera, self.cable.inside(*self.node_command(camera, zenoh__connect=f'["{self.endpoint}"]',
-                                                                    zenoh__insecure="true")))
+                                                                    zenoh__insecure="true", **settings)))
         self.wait_alive(*CAMERAS)
 
 
@@ -166,6 +176,68 @@ def packet_loss(work, ready, percent, observations):
         assert account["results"] == observations, account
         return {"loss_percent": percent, "observations": observations, "median_s": round(statistics.median(times), 2),
                 "slowest_s": round(max(times), 2), **account}
+
+
+def arrivals_s(line):
+    """Of every imprint the time from the node's having it to fusion's having stored it."""
+    stored = {(camera, session, observation): 1e-9 * received_ns for camera, session, observation, received_ns in line.stored(
+        "SELECT camera, session, observation, received_ns FROM message WHERE camera IS NOT NULL")}
+    times = []
+    for camera in CAMERAS:
+        for time_text, session, observation in re.findall(r"^(\S+) info imprint-node: session (\S+) observation (\d+): imprint sent",
+                                                          (line.folder / f"{camera}.log").read_text(errors="replace"), re.MULTILINE):
+            sent = datetime.datetime.fromisoformat(time_text).astimezone().timestamp()
+            times.append(stored[camera, session, int(observation)] - sent)
+    return times
+
+
+def thin_link(work, ready, minutes, live_s=20):
+    """All three nodes behind 64 kbit/s: every minute 20 s of measuring, an operator peeking all the time."""
+    with Cable() as cable, CabledLine(work, ready, cable, deadline_s=2 * PATIENCE_S) as line:
+        line.start_all(capture__source='"folder"', capture__path=f'"{ready.folder.parent / "rendered"}"', exposure__auto="false",
+                       health__period_s="5.0")
+        line.trigger_until_taken("first")
+        line.wait_for_results(["first"])
+        cable.limit("64kbit")
+        sessions, peeks, sizes, failures, done = ["first"], [], [], [], threading.Event()
+
+        def peek_on():
+            wanted = itertools.cycle((("cam1",), ("cam2", "--region", "100,100,400,300"), ("cam3", "--bytes", "2000")))
+            for camera, *options in wanted:
+                if done.is_set():
+                    return
+                peek = imprint("peek", camera, *options, "--connect", line.endpoint, "--out", line.folder / "peek.jpg", "--json")
+                if peek.returncode:
+                    failures.append(peek.stderr)
+                    return
+                about = json.loads(peek.stdout)
+                peeks.append(about["took_s"])
+                sizes.append(about["bytes"])
+                done.wait(0.5)
+
+        operator = threading.Thread(target=peek_on)
+        operator.start()
+        try:
+            for minute in range(minutes):
+                begin = time.monotonic()
+                while time.monotonic() - begin < live_s:
+                    sessions.append(f"M{minute}-{len(sessions)}")
+                    line.trigger_until_taken(sessions[-1])
+                    time.sleep(4)
+                if minute + 1 < minutes:
+                    time.sleep(max(0, 60 - (time.monotonic() - begin)))
+        finally:
+            done.set()
+            operator.join()
+        assert not failures, failures
+        line.wait_for_results(sessions)
+        took = arrivals_s(line)
+        assert len(took) == len(CAMERAS) * len(sessions)
+        figures = {"imprints": len(took), "imprint_median_s": round(statistics.median(took), 2), "imprint_slowest_s": round(max(took), 2),
+                   "peeks": len(peeks), "peek_median_s": round(statistics.median(peeks), 2), "peek_slowest_s": round(max(peeks), 2),
+                   "peek_bytes": f"{min(sizes)}-{max(sizes)}"}
+        assert max(took) < 3 and max(peeks) < 5, figures
+        return figures
 
 
 @contextlib.contextmanager

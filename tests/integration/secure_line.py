@@ -49,8 +49,8 @@ class SecureLine(ReadyLine):
     def speak_as(self, person):
         os.environ["IMPRINT_IDENTITY"] = str(self.plant.identity(person))
 
-    def start_all(self):
-        self.start_fusion("--set", f'zenoh.listen=["{self.endpoint}"]', "--set", f'zenoh.identity="{self.plant.identity("fusion")}"',
+    def start_all(self, *fusion_arguments):
+        self.start_fusion(*fusion_arguments, "--set", f'zenoh.listen=["{self.endpoint}"]', "--set", f'zenoh.identity="{self.plant.identity("fusion")}"',
                           "--set", f'zenoh.access="{self.plant.folder / "access.json"}"')
         for camera in CAMERAS:
             self.start_camera(camera)

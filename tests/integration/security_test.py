@@ -1,12 +1,16 @@
 """Who is let in on mutual TLS, and what a certificate allows: real programs, each wrong certificate there is."""
+import json
 import os
 import pathlib
 import shutil
 import signal
+import ssl
 import subprocess
 import tempfile
 import time
 import unittest
+import urllib.error
+import urllib.request
 
 import python_environment
 from ready_imprints import ReadyImprints
@@ -98,6 +102,39 @@ class SecurityTest(unittest.TestCase):
             line.speak_as("operator")
             self.measures(line, "by-operator")
             self.assertEqual(line.stored("SELECT DISTINCT session FROM message"), [("by-operator",)])
+
+    def test_beyond_this_machine_the_page_is_https_and_for_users(self):
+        with SecureLine(work, ready) as line:
+            users = line.folder / "users.json"
+            done = subprocess.run([os.environ["IMPRINT"], "users", "set", "otto", "--role", "operator", "--file", users],
+                                  input="red steel 1200\n", capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertNotIn("red steel", users.read_text())
+            line.start_all("--set", "page.address=0.0.0.0", "--set", f'page.users="{users}"')
+            trusted = ssl.create_default_context(cafile=line.plant.folder / "ca.pem")
+            page = f"https://127.0.0.1:{line.page}"
+
+            def ask(path, body=None, cookie=""):
+                request = urllib.request.Request(page + path, body and json.dumps(body).encode(), {"X-Imprint": "1", "Cookie": cookie})
+                try:
+                    with urllib.request.urlopen(request, timeout=10, context=trusted) as answer:
+                        return answer.status, answer.headers.get("Set-Cookie", "")
+                except urllib.error.HTTPError as refused:
+                    with refused:
+                        return refused.code, ""
+
+            self.assertEqual(ask("/api/status")[0], 401)
+            self.assertEqual(ask("/api/sign-in", {"name": "otto", "password": "red steel 1201"})[0], 401)
+            status, cookie = ask("/api/sign-in", {"name": "otto", "password": "red steel 1200"})
+            self.assertEqual(status, 200)
+            self.assertIn("Secure", cookie)
+            cookie = cookie.split(";")[0]
+            self.assertEqual(ask("/api/status", cookie=cookie)[0], 200)
+            self.assertEqual(ask("/api/trigger", {"session": "by-otto", "observations_expected": 1}, cookie)[0], 200)
+            line.wait_for_results(["by-otto"])
+            told = [json.loads(text) for text in (line.folder / "imprint.db.audit.jsonl").read_text().splitlines()]
+            self.assertEqual([(entry["who"], entry["what"]) for entry in told],
+                             [("somebody", "sign-in refused"), ("otto", "signed in"), ("otto", "triggered session by-otto observation 0")])
 
     def test_plain_endpoints_beyond_this_machine_are_refused(self):
         with SecureLine(work, ready) as line:

@@ -5,6 +5,7 @@ to build/soak.md; docs/reliability.md holds that of the last full run. Needs roo
 import argparse
 import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +21,22 @@ import faults  # noqa: E402: reads the environment
 import python_environment  # noqa: E402
 from ready_imprints import ReadyImprints  # noqa: E402
 
+FUZZ_S = 600
+
+
+def fuzz(program, *arguments):
+    """Ten minutes of inputs nobody would send; a finding ends the program, and lies where it says."""
+    def run(work, _ready, _python):
+        done = subprocess.run([ROOT / "build" / "tests" / "fuzz" / program, *arguments, "--seconds", str(FUZZ_S)], cwd=work,
+                              capture_output=True, text=True, check=False)
+        if done.returncode:
+            for finding in pathlib.Path(work).glob("finding-*"):
+                finding.replace(ROOT / "build" / finding.name)
+            raise AssertionError(f"a finding, kept in build/: {done.stderr.strip()}")
+        return {"said": done.stdout.strip()}
+    return run
+
+
 FAULTS = {
     "kills": lambda work, ready, python: faults.kills(work, ready, python, observations=200, kill_count=50),
     "cut-2s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=2, observations=5),
@@ -27,10 +44,14 @@ FAULTS = {
     "cut-50s": lambda work, ready, _: faults.cable_cut(work, ready, cut_s=50, observations=8),
     "loss-5": lambda work, ready, _: faults.packet_loss(work, ready, percent=5, observations=50),
     "loss-20": lambda work, ready, _: faults.packet_loss(work, ready, percent=20, observations=20),
+    "thin-link": lambda work, ready, _: faults.thin_link(work, ready, minutes=10),
     "node-disk": lambda work, ready, _: faults.node_disk_full(work, ready),
     "fusion-disk": lambda work, ready, _: faults.fusion_disk_full(work, ready),
     "clocks": lambda work, ready, _: faults.clock_jumps(work, ready),
     "hostile": lambda work, ready, python: faults.hostile_client(work, ready, python, messages=100_000),
+    "fuzz-wire": fuzz("wire_fuzz"),
+    **{f"fuzz-{kind}": fuzz("file_fuzz", kind) for kind in ("config", "library", "field", "session", "rig", "access")},
+    "fuzz-http": fuzz("http_fuzz"),
 }
 
 

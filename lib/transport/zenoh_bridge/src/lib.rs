@@ -95,7 +95,14 @@ mod ffi {
             key: &str,
             handler: SharedPtr<RequestHandler>,
         ) -> Result<Box<Queryable>>;
-        fn get(self: &Session, selector: &str, payload: &[u8], timeout_ms: u64) -> Result<Vec<Reply>>;
+        /// The replies travel with the query's priority.
+        fn get(
+            self: &Session,
+            selector: &str,
+            payload: &[u8],
+            timeout_ms: u64,
+            setup: &PublisherSetup,
+        ) -> Result<Vec<Reply>>;
 
         type Publisher;
         fn put(self: &Publisher, payload: &[u8]) -> Result<()>;
@@ -275,7 +282,13 @@ impl Session {
         Ok(Box::new(Queryable(queryable)))
     }
 
-    fn get(&self, selector: &str, payload: &[u8], timeout_ms: u64) -> Outcome<Vec<ffi::Reply>> {
+    fn get(
+        &self,
+        selector: &str,
+        payload: &[u8],
+        timeout_ms: u64,
+        setup: &ffi::PublisherSetup,
+    ) -> Outcome<Vec<ffi::Reply>> {
         let replies = self
             .0
             .get(selector)
@@ -283,6 +296,9 @@ impl Session {
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
             .timeout(Duration::from_millis(timeout_ms))
+            .priority(Priority::try_from(setup.priority)?)
+            .congestion_control(CongestionControl::Block)
+            .express(setup.express)
             .wait()?;
         let mut answers = Vec::new();
         while let Ok(reply) = replies.recv() {
