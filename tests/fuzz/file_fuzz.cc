@@ -8,6 +8,7 @@
 #include "fusion/fusion_config.h"
 #include "lib/access/access_list.h"
 #include "lib/access/user_list.h"
+#include "lib/camera/camera_file.h"
 #include "lib/rig/rig.h"
 #include "lib/targets/target_field.h"
 #include "lib/targets/target_library.h"

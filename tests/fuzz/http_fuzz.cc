@@ -15,9 +15,8 @@
 namespace imprint {
 namespace {
 
-int connected(int port) {
+int connected(int port, timeval patience) {
   const int link = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const timeval patience{5, 0};
   ::setsockopt(link, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -28,12 +27,14 @@ int connected(int port) {
   return -1;
 }
 
-// What the server says to the bytes, up to its first words; then nothing more is sent.
-std::string said_to(int port, std::span<const std::uint8_t> bytes) {
-  const int link = connected(port);
+constexpr timeval kFiveSeconds{5, 0};
+constexpr timeval kAMoment{0, 20'000};  // it may wait for more that never comes
+
+// What the server says to the bytes, up to its first words.
+std::string said_to(int port, std::span<const std::uint8_t> bytes, timeval patience) {
+  const int link = connected(port, patience);
   if (link < 0) return {};
   [[maybe_unused]] const auto sent = ::send(link, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-  ::shutdown(link, SHUT_WR);
   char buffer[512];
   const auto got = ::recv(link, buffer, sizeof buffer, 0);
   ::close(link);
@@ -67,8 +68,9 @@ int main(int argc, char** argv) {
   const int port = (*page)->port();
   const std::string alive = get("/healthz");
   const auto take = [&](std::span<const std::uint8_t> bytes) {
-    (void)said_to(port, bytes);
-    const std::string answer = said_to(port, {reinterpret_cast<const std::uint8_t*>(alive.data()), alive.size()});
+    (void)said_to(port, bytes, kAMoment);
+    const std::string answer =
+        said_to(port, {reinterpret_cast<const std::uint8_t*>(alive.data()), alive.size()}, kFiveSeconds);
     if (!answer.starts_with("HTTP/1.1 200")) {
       std::cerr << "the page no longer answers: " << answer << '\n';
       std::abort();

@@ -9,7 +9,8 @@ namespace {
 
 using Lines = std::vector<std::string>;
 
-std::string value_of(RemoteSettings& settings) {
+template <class Settings>
+std::string value_of(Settings&& settings) {
   toml::table table = toml::parse("[exposure]\nauto = true\n");
   REQUIRE(settings.lay_over(table));
   return table.at_path("exposure.auto").value_or(true) ? "own" : "from afar";
