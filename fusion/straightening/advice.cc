@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 
 #include "fusion/combine/alignment.h"
 
@@ -30,6 +31,12 @@ class Straightener {
       diameter_.push_back(section.diameter_mm);
       axis_.emplace_back(section.axis_mm[1], section.axis_mm[2]);
     }
+    constexpr std::size_t kApart = 5;  // sections between places that are tried
+    const double half = 0.5 * config.support_span_mm;
+    for (std::size_t i = 0; i < s_.size(); i += kApart) {
+      if (s_[i] - half < config.end_margin_mm || s_[i] + half > length_mm_ - config.end_margin_mm) continue;
+      places_.push_back({i, bent_at(i)});
+    }
   }
 
   [[nodiscard]] const Axis& axis() const { return axis_; }
@@ -40,82 +47,163 @@ class Straightener {
     return most;
   }
 
-  /// The stroke that leaves least; false when none leaves less than a twentieth less than there is.
-  bool stroke(Stroke& best) {
-    constexpr std::size_t kApart = 5;  // sections between places that are tried
-    constexpr double kWorthwhile = 0.95;
-    double least = kWorthwhile * largest(axis_);
-    bool found = false;
-    Axis bent;
-    for (std::size_t i = 0; i < s_.size(); i += kApart) {
-      const double half = 0.5 * config_.support_span_mm;
-      if (s_[i] - half < config_.end_margin_mm || s_[i] + half > length_mm_ - config_.end_margin_mm) continue;
-      const Axis shape = aligned(bend(Axis(axis_.size(), Eigen::Vector2d::Zero()), i, Eigen::Vector2d::UnitX()));
-      const Eigen::Vector2d angle = best_angle(shape);
-      Axis after = axis_;
-      for (std::size_t k = 0; k < after.size(); ++k) after[k] += shape[k].x() * angle;
-      const double left = largest(after);
-      if (left >= least) continue;
-      least = left;
-      found = true;
-      bent = std::move(after);
-      // An angle of the axis after the hinge pushes the hinge the other way, against the line of the supports.
-      const Eigen::Vector2d push = -angle;
-      best.at_mm = s_[i];
-      best.support_first_mm = s_[i] - half;
-      best.support_last_mm = s_[i] + half;
-      best.bend_mm = 0.5 * half * push.norm();
-      best.travel_mm = config_.springback * best.bend_mm;
-      const double direction = std::atan2(push.y(), push.x()) * 180.0 / M_PI;
-      best.turn_deg = std::remainder(config_.press_direction_deg - direction, 360.0);
-      best.predicted_max_deflection_mm = left;
+  /// As few strokes as bring the axis within tolerance, all their places and sizes chosen together: a stroke that
+  /// leaves least by itself can leave a wave that no further one takes away. `axis()` is then the one they leave.
+  std::vector<Stroke> strokes() {
+    constexpr double kWorthwhile = 0.95;  // a further stroke leaves at most this share
+    std::vector<std::size_t> at;
+    Fit fit{{}, largest(axis_)};
+    while (!places_.empty() && fit.left_mm > config_.tolerance_mm &&
+           static_cast<int>(at.size()) < config_.most_strokes) {
+      std::vector<std::size_t> more = at, spread;
+      more.push_back(0);
+      for (std::size_t j = 0; j < more.size(); ++j) spread.push_back((2 * j + 1) * places_.size() / (2 * more.size()));
+      Fit better = place(more);
+      if (const Fit evenly = place(spread); evenly.left_mm < better.left_mm) {
+        better = evenly;
+        more = spread;
+      }
+      if (!(better.left_mm < kWorthwhile * fit.left_mm)) break;
+      at = std::move(more);
+      fit = better;
     }
-    if (found) axis_ = std::move(bent);
-    return found;
+    return in_order(at, fit);
   }
 
  private:
-  [[nodiscard]] Axis bend(Axis axis, std::size_t at, const Eigen::Vector2d& angle) const {
-    for (std::size_t k = 0; k < axis.size(); ++k) axis[k] += hinge(s_[k], s_[at], diameter_[at]) * angle;
-    return axis;
-  }
-  [[nodiscard]] Axis aligned(Axis axis) const {
+  /// A place for the ram, and how the axis moves, seen from its new ideal axis, when it bends there by an angle of 1.
+  struct Place {
+    std::size_t section;
+    std::vector<double> shape;
+  };
+  /// Angles of strokes at given places, and the largest deflection they leave.
+  struct Fit {
+    std::vector<Eigen::Vector2d> angles;
+    double left_mm;
+  };
+
+  [[nodiscard]] std::vector<double> bent_at(std::size_t at) const {
+    Axis axis;
+    for (const double s : s_) axis.emplace_back(hinge(s, s_[at], diameter_[at]), 0.0);
     const IdealAxis line = ideal_axis(s_, axis, 0.0, length_mm_, end_section_mm_);
-    for (std::size_t k = 0; k < axis.size(); ++k) axis[k] -= line.at(s_[k]).tail<2>();
+    std::vector<double> shape;
+    for (std::size_t k = 0; k < s_.size(); ++k) shape.push_back(axis[k].x() - line.at(s_[k]).y());
+    return shape;
+  }
+
+  [[nodiscard]] Axis after(std::span<const std::size_t> at, const Fit& fit) const {
+    Axis axis = axis_;
+    for (std::size_t j = 0; j < at.size(); ++j)
+      for (std::size_t k = 0; k < axis.size(); ++k) axis[k] += places_[at[j]].shape[k] * fit.angles[j];
     return axis;
   }
 
-  /// The angle that leaves the least largest deflection: least p-th powers with p doubled, as for the minimum zone.
-  [[nodiscard]] Eigen::Vector2d best_angle(const Axis& shape) const {
-    Eigen::Vector2d angle = Eigen::Vector2d::Zero(), best = angle;
-    double least = largest(axis_);
+  /// Moves the places in turn, the last one first (it may not be chosen yet), to where they leave least.
+  Fit place(std::vector<std::size_t>& at) const {
+    constexpr int kRounds = 3;
+    Fit best{{}, largest(axis_)};
+    for (int round = 0; round < kRounds; ++round)
+      for (std::size_t j = at.size(); j-- > 0;) best = place_one(at, j);
+    return best;
+  }
+
+  /// Of places that leave nearly the same, the one nearest to where the others leave most: there the bow is seen.
+  Fit place_one(std::vector<std::size_t>& at, std::size_t j) const {
+    const double alike_mm = 0.1 * config_.tolerance_mm;
+    std::vector<std::size_t> others = at;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(j));
+    const Axis rest = after(others, angles(others));
+    const auto most = static_cast<std::size_t>(
+        std::ranges::max_element(rest, {}, [](const Eigen::Vector2d& point) { return point.norm(); }) - rest.begin());
+    std::vector<Fit> fits;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      at[j] = i;
+      fits.push_back(angles(at));
+      least = std::min(least, fits.back().left_mm);
+    }
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const double apart = std::abs(s_[places_[i].section] - s_[most]);
+      if (fits[i].left_mm > least + alike_mm || apart >= nearest) continue;
+      nearest = apart;
+      at[j] = i;
+    }
+    return fits[at[j]];
+  }
+
+  /// The angles that leave the least largest deflection: least p-th powers with p doubled, as for the minimum zone.
+  [[nodiscard]] Fit angles(std::span<const std::size_t> at) const {
+    const auto n = static_cast<Eigen::Index>(at.size());
+    Fit best{std::vector<Eigen::Vector2d>(at.size(), Eigen::Vector2d::Zero()), largest(axis_)};
+    if (at.empty()) return best;
+    Fit fit = best;
     std::vector<double> distance(axis_.size(), 1.0);
     for (double p = 2.0; p < 200.0; p *= 2.0) {
       for (int iteration = 0; iteration < (p > 2.0 ? 4 : 1); ++iteration) {
         const double most = *std::ranges::max_element(distance);
-        if (!(most > 0.0)) return angle;
-        double normal = 1e-12;
-        Eigen::Vector2d right = Eigen::Vector2d::Zero();
+        if (!(most > 0.0)) return fit;
+        Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+        Eigen::MatrixXd right = Eigen::MatrixXd::Zero(n, 2);
+        Eigen::VectorXd row(n);
         for (std::size_t k = 0; k < axis_.size(); ++k) {
           const double weight = std::pow(distance[k] / most, p - 2.0);
-          normal += weight * shape[k].x() * shape[k].x();
-          right -= weight * shape[k].x() * axis_[k];
+          for (Eigen::Index j = 0; j < n; ++j) row(j) = places_[at[static_cast<std::size_t>(j)]].shape[k];
+          normal += weight * row * row.transpose();
+          right -= weight * row * axis_[k].transpose();
         }
-        angle += (right / normal - angle) / (p - 1.0);
-        double widest = 0.0;
-        for (std::size_t k = 0; k < axis_.size(); ++k) {
-          distance[k] = (axis_[k] + shape[k].x() * angle).norm();
-          widest = std::max(widest, distance[k]);
+        normal.diagonal().array() += 1e-9 * normal.trace() + 1e-12;  // two strokes at one place
+        const Eigen::MatrixXd solution = normal.ldlt().solve(right);
+        for (Eigen::Index j = 0; j < n; ++j) {
+          Eigen::Vector2d& angle = fit.angles[static_cast<std::size_t>(j)];
+          angle += (solution.row(j).transpose() - angle) / (p - 1.0);
         }
-        if (widest < least) least = widest, best = angle;
+        const Axis bent = after(at, fit);
+        for (std::size_t k = 0; k < bent.size(); ++k) distance[k] = bent[k].norm();
+        fit.left_mm = largest(bent);
+        if (fit.left_mm < best.left_mm) best = fit;
       }
     }
     return best;
   }
 
+  /// The strokes as they are made, each time the one that leaves least.
+  std::vector<Stroke> in_order(std::vector<std::size_t> at, Fit fit) {
+    std::vector<Stroke> strokes;
+    while (!at.empty()) {
+      double least = std::numeric_limits<double>::infinity();
+      std::size_t next = 0;
+      for (std::size_t j = 0; j < at.size(); ++j) {
+        const double left = largest(after(std::span(&at[j], 1), {{fit.angles[j]}, 0.0}));
+        if (left < least) least = left, next = j;
+      }
+      strokes.push_back(stroke(places_[at[next]].section, fit.angles[next], least));
+      axis_ = after(std::span(&at[next], 1), {{fit.angles[next]}, 0.0});
+      at.erase(at.begin() + static_cast<std::ptrdiff_t>(next));
+      fit.angles.erase(fit.angles.begin() + static_cast<std::ptrdiff_t>(next));
+    }
+    return strokes;
+  }
+
+  [[nodiscard]] Stroke stroke(std::size_t section, const Eigen::Vector2d& angle, double left_mm) const {
+    // An angle of the axis after the hinge pushes the hinge the other way, against the line of the supports.
+    const Eigen::Vector2d push = -angle;
+    const double half = 0.5 * config_.support_span_mm;
+    const double direction = std::atan2(push.y(), push.x()) * 180.0 / M_PI;
+    const double bend = 0.5 * half * push.norm();
+    return {.at_mm = s_[section],
+            .support_first_mm = s_[section] - half,
+            .support_last_mm = s_[section] + half,
+            .turn_deg = std::remainder(config_.press_direction_deg - direction, 360.0),
+            .bend_mm = bend,
+            .travel_mm = config_.springback * bend,
+            .predicted_max_deflection_mm = left_mm};
+  }
+
   StraighteningConfig config_;
   double end_section_mm_, length_mm_;
   std::vector<double> s_, diameter_;
+  std::vector<Place> places_;
   Axis axis_;
 };
 
@@ -147,13 +235,8 @@ Result<StraighteningAdvice> advise(const Measurement& m, double end_section_mm, 
   if (config.support_span_mm + 2.0 * config.end_margin_mm > m.length_mm)
     return invalid_input("supports {:.0f} mm apart and {:.0f} mm from the ends do not fit under {:.0f} mm",
                          config.support_span_mm, config.end_margin_mm, m.length_mm);
-  double left = m.max_deflection_mm;
-  Stroke stroke;
-  while (left > config.tolerance_mm && static_cast<int>(advice.strokes.size()) < config.most_strokes &&
-         straightener.stroke(stroke)) {
-    advice.strokes.push_back(stroke);
-    left = stroke.predicted_max_deflection_mm;
-  }
+  advice.strokes = straightener.strokes();
+  const double left = advice.strokes.empty() ? m.max_deflection_mm : advice.strokes.back().predicted_max_deflection_mm;
   advice.action = !advice.strokes.empty();
   advice.predicted_axis_mm = straightener.axis();
   advice.reason =

@@ -39,7 +39,7 @@ struct StraighteningAdvice {
   std::vector<Eigen::Vector2d> predicted_axis_mm;  ///< after all strokes, one a section, seen from its own ideal axis
 };
 
-/// Where to press: strokes chosen one after the other, each the one that leaves the least deflection. A stroke bends
+/// Where to press: as few strokes as are needed, chosen together so that the least deflection is left. A stroke bends
 /// the axis where the ram stands, over one diameter, and leaves what lies outside the supports straight as it was
 /// (a plastic hinge); the axis is then seen from its new ideal axis. `end_section_mm` as the rig's. Fails
 /// (invalid_input) when the supports do not fit under the forging.

@@ -53,8 +53,9 @@ TEST_CASE("straightening: a kink is pressed where it is, by what the geometry sa
   CHECK(stroke.at_mm == Approx(1000.0).margin(25.0));  // every fifth section is tried, 19 mm apart
   CHECK(stroke.support_first_mm == Approx(stroke.at_mm - 400.0));
   CHECK(stroke.support_last_mm == Approx(stroke.at_mm + 400.0));
-  // The kink's angle is 1/100 + 1/90; between supports 400 mm either side that is 4.2 mm of sag.
-  CHECK(stroke.bend_mm == Approx(0.5 * 400.0 * (0.01 + 1.0 / 90.0)).epsilon(0.05));
+  // The kink's angle is 1/100 + 1/90; between supports 400 mm either side that is 4.2 mm of sag. A little more leaves
+  // less, as an arc of a diameter takes the place of the kink.
+  CHECK(stroke.bend_mm == Approx(0.5 * 400.0 * (0.01 + 1.0 / 90.0)).epsilon(0.1));
   CHECK(stroke.travel_mm == Approx(1.25 * stroke.bend_mm));
   CHECK(stroke.predicted_max_deflection_mm < 1.0);  // an arc of a diameter is not a kink
   double largest = 0.0;
