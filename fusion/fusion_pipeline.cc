@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "fusion/combine/combine_config.h"
+#include "fusion/faceted/faceted.h"
+#include "fusion/faceted/section_evidence.h"
 #include "fusion/thesis/thesis_geometry.h"
 #include "fusion/triangulate/triangulate_config.h"
 
@@ -70,30 +72,33 @@ Result<SpaceCurves> curves_of(const Observation& observation, const ObservedForg
   return space_curves(views, forging, ThesisConfig{});
 }
 
-}  // namespace
-
-Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
-                         std::string method, GeometryMethod geometry) {
-  if (observations.empty()) return job_failed("session {}: no observation", session);
-  std::vector<ObservedForging> observed;
-  std::vector<SpaceCurves> curves;  // of `observed`, where the thesis's geometry is asked for
-  std::vector<double> rotations_deg;
+/// All observations of a session, triangulated.
+struct Triangulated {
+  std::vector<ObservedForging> observed;  ///< those that could be
+  std::vector<SpaceCurves> curves;        ///< of `observed`, where the thesis's geometry is asked for
+  std::vector<double> rotations_deg;      ///< of `observed`
   std::vector<Measurement::Observation> reports;
   std::vector<std::string> warnings;
+};
+
+Result<Triangulated> triangulate_all(const std::vector<Observation>& observations, const ForgingSpec& forging,
+                                     const std::string& session, GeometryMethod geometry,
+                                     const TriangulateConfig& config) {
+  Triangulated all;
   std::string first_failure;
   for (const Observation& observation : observations) {
     Measurement::Observation report{
         .index = observation.index, .rotation_deg = observation.rotation_deg, .cameras = {}};
-    auto triangulated = triangulate(observation.imprints, forging, TriangulateConfig{});
+    auto triangulated = triangulate(observation.imprints, forging, config);
     if (triangulated) {
       report.cameras = triangulated->cameras;
       for (const std::string& warning : triangulated->warnings)
-        warnings.push_back(fmt::format("observation {}: {}", observation.index, warning));
+        all.warnings.push_back(fmt::format("observation {}: {}", observation.index, warning));
     } else {
       report.cameras = shares_of_failed(observation, triangulated.error().message);
       const std::string failure = fmt::format("observation {}: {}", observation.index, triangulated.error().message);
       if (first_failure.empty()) first_failure = failure;
-      warnings.push_back(failure + "; the observation is left out");
+      all.warnings.push_back(failure + "; the observation is left out");
     }
     for (const auto& [id, why] : observation.missing) {
       CameraShare share;
@@ -101,35 +106,71 @@ Result<Measurement> fuse(const std::vector<Observation>& observations, const For
       share.excluded = true;
       share.reason = why;
       report.cameras.push_back(std::move(share));
-      warnings.push_back(fmt::format("observation {}: camera {} left out: {}", observation.index, id, why));
+      all.warnings.push_back(fmt::format("observation {}: camera {} left out: {}", observation.index, id, why));
     }
-    reports.push_back(std::move(report));
+    all.reports.push_back(std::move(report));
     if (!triangulated) continue;
     if (geometry == GeometryMethod::thesis) {
       auto of_views = curves_of(observation, *triangulated, forging);
       if (!of_views)
         return job_failed("session {}: observation {}: {}", session, observation.index, of_views.error().message);
-      curves.push_back(std::move(*of_views));
+      all.curves.push_back(std::move(*of_views));
     }
-    observed.push_back(std::move(*triangulated));
-    rotations_deg.push_back(observation.rotation_deg);
+    all.observed.push_back(std::move(*triangulated));
+    all.rotations_deg.push_back(observation.rotation_deg);
   }
-  if (observed.empty()) {
+  if (all.observed.empty()) {
     std::string missing;
     for (const auto& [id, why] : observations.front().missing) missing += fmt::format("; {}: {}", id, why);
     return job_failed("session {}: {}{}", session, first_failure, missing);
   }
-  note_poses(observations, reports, warnings);
-  auto combined = geometry == GeometryMethod::thesis ? thesis_geometry(curves, rotations_deg, forging, ThesisConfig{})
-                                                     : combine(observed, rotations_deg, forging, CombineConfig{});
-  if (!combined) return job_failed("session {}: {}", session, combined.error().message);
-  combined->warnings.insert(combined->warnings.begin(), warnings.begin(), warnings.end());
-  Measurement measurement = make_measurement(*combined, std::move(reports), std::move(session), std::move(method));
+  return all;
+}
+
+/// Whether sections with faces are to be looked for: the rig says so, or leaves it open and the widths change as the
+/// forging is turned.
+bool may_have_faces(const std::vector<Observation>& observations, const ForgingSpec& forging) {
+  if (forging.section != SectionKind::unknown) return forging.section != SectionKind::round;
+  std::vector<std::vector<Imprint>> imprints;
+  for (const Observation& observation : observations) imprints.push_back(observation.imprints);
+  return change_of_width(imprints) > kRoundestFaceted;
+}
+
+}  // namespace
+
+Result<Measurement> fuse(const std::vector<Observation>& observations, const ForgingSpec& forging, std::string session,
+                         std::string method, GeometryMethod geometry) {
+  if (observations.empty()) return job_failed("session {}: no observation", session);
+  const bool joint = geometry == GeometryMethod::joint;
+  Result<Triangulated> all = Triangulated{};
+  Result<CombinedForging> combined = CombinedForging{};
+  const auto combine_with = [&](std::span<const ObservedForging> observed, std::span<const double> rotations) {
+    return combined->section_kind == SectionKind::round
+               ? combine(observed, rotations, forging, CombineConfig{})
+               : combine_faceted(observed, rotations, forging, combined->section_kind, CombineConfig{});
+  };
+  if (joint && may_have_faces(observations, forging)) {
+    TriangulateConfig faceted;
+    faceted.out_of_round_share = TriangulateConfig::kFacetedShare;
+    all = triangulate_all(observations, forging, session, geometry, faceted);
+    if (!all) return pass_on(all.error());
+    combined = combine_faceted(all->observed, all->rotations_deg, forging, forging.section, CombineConfig{});
+    if (!combined) return job_failed("session {}: {}", session, combined.error().message);
+  }
+  if (combined->section_kind == SectionKind::round) {
+    all = triangulate_all(observations, forging, session, geometry, TriangulateConfig{});
+    if (!all) return pass_on(all.error());
+    combined = joint ? combine(all->observed, all->rotations_deg, forging, CombineConfig{})
+                     : thesis_geometry(all->curves, all->rotations_deg, forging, ThesisConfig{});
+    if (!combined) return job_failed("session {}: {}", session, combined.error().message);
+  }
+  note_poses(observations, all->reports, all->warnings);
+  combined->warnings.insert(combined->warnings.begin(), all->warnings.begin(), all->warnings.end());
+  Measurement measurement = make_measurement(*combined, std::move(all->reports), std::move(session), std::move(method));
   measurement.geometry = name_of(geometry);
-  if (observed.size() > 1 && geometry == GeometryMethod::joint) {
-    const auto alone =
-        combine(std::span(observed).first(1), std::span(rotations_deg).first(1), forging, CombineConfig{});
-    if (alone) measurement.gain = {static_cast<int>(observed.size()), sureness(*alone), sureness(*combined)};
+  if (all->observed.size() > 1 && joint) {
+    const auto alone = combine_with(std::span(all->observed).first(1), std::span(all->rotations_deg).first(1));
+    if (alone) measurement.gain = {static_cast<int>(all->observed.size()), sureness(*alone), sureness(*combined)};
   }
   return measurement;
 }

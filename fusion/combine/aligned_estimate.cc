@@ -29,7 +29,7 @@ class ChainDraws {
   ChainDraws(const JointEstimate& joint, const IdealAxis& line)
       : line_(line),
         deviations_(joint.system.deviations(
-            normal_values(joint.system.nodes() * kNodeUnknowns + joint.system.border.cols(), kDraws, 20230415))) {
+            normal_values(joint.system.nodes() * kNodeUnknowns + joint.system.border_size(), kDraws, 20230415))) {
     for (int d = 0; d < kDraws; ++d) {
       Eigen::Vector2d mean = Eigen::Vector2d::Zero(), slope = Eigen::Vector2d::Zero();
       for (std::size_t i = 0; i < joint.nodes.size(); ++i) {

@@ -1,113 +1,161 @@
 #include "fusion/combine/bordered_system.h"
 
+#include <algorithm>
+
 namespace imprint {
 
-BorderedSystem::BorderedSystem(int nodes, int border_count)
-    : diagonal(static_cast<std::size_t>(nodes), NodeMatrix::Zero()),
-      upper(static_cast<std::size_t>(nodes), NodeMatrix::Zero()),
-      right(static_cast<std::size_t>(nodes), NodeVector::Zero()),
-      border(Eigen::MatrixXd::Zero(nodes * kNodeUnknowns, border_count)),
+template <int kUnknowns>
+BorderedChain<kUnknowns>::BorderedChain(int nodes, int border_count)
+    : diagonal(static_cast<std::size_t>(nodes), Matrix::Zero()),
+      upper(static_cast<std::size_t>(nodes), Matrix::Zero()),
+      right(static_cast<std::size_t>(nodes), Vector::Zero()),
+      border(Eigen::MatrixXd::Zero(border_count, nodes * kUnknowns)),
       corner(Eigen::MatrixXd::Zero(border_count, border_count)),
       border_right(Eigen::VectorXd::Zero(border_count)) {}
 
-void BorderedSystem::forward(Eigen::Ref<Eigen::MatrixXd> columns) const {
+template <int kUnknowns>
+void BorderedChain<kUnknowns>::clear() {
+  for (auto* blocks : {&diagonal, &upper}) std::fill(blocks->begin(), blocks->end(), Matrix::Zero());
+  std::fill(right.begin(), right.end(), Vector::Zero());
+  border.setZero();
+  corner.setZero();
+  border_right.setZero();
+}
+
+template <int kUnknowns>
+void BorderedChain<kUnknowns>::forward(Eigen::MatrixXd& rows) const {
+  Eigen::Matrix<double, Eigen::Dynamic, kUnknowns> block(rows.rows(), kUnknowns);
   for (int i = 0; i < nodes(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    auto rows = columns.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
-    if (i > 0)
-      rows.noalias() -= coupled_[k - 1].transpose() * columns.middleRows<kNodeUnknowns>((i - 1) * kNodeUnknowns);
-    factor_[k].triangularView<Eigen::Lower>().solveInPlace(rows);
+    block = rows.middleCols<kUnknowns>(i * kUnknowns);
+    if (i > 0) block.noalias() -= rows.middleCols<kUnknowns>((i - 1) * kUnknowns) * coupled_[k - 1];
+    rows.middleCols<kUnknowns>(i * kUnknowns).noalias() = block * inverse_[k].transpose();
   }
 }
 
-void BorderedSystem::backward(Eigen::Ref<Eigen::MatrixXd> columns) const {
+template <int kUnknowns>
+void BorderedChain<kUnknowns>::backward(Eigen::MatrixXd& rows) const {
+  Eigen::Matrix<double, Eigen::Dynamic, kUnknowns> block(rows.rows(), kUnknowns);
   for (int i = nodes() - 1; i >= 0; --i) {
     const auto k = static_cast<std::size_t>(i);
-    auto rows = columns.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
-    if (i + 1 < nodes()) rows.noalias() -= coupled_[k] * columns.middleRows<kNodeUnknowns>((i + 1) * kNodeUnknowns);
-    factor_[k].transpose().triangularView<Eigen::Upper>().solveInPlace(rows);
+    block = rows.middleCols<kUnknowns>(i * kUnknowns);
+    if (i + 1 < nodes()) block.noalias() -= rows.middleCols<kUnknowns>((i + 1) * kUnknowns) * coupled_[k].transpose();
+    rows.middleCols<kUnknowns>(i * kUnknowns).noalias() = block * inverse_[k];
   }
 }
 
-bool BorderedSystem::solve() {
-  const int n = nodes();
-  factor_.resize(diagonal.size());
+template <int kUnknowns>
+bool BorderedChain<kUnknowns>::factor() {
+  inverse_.resize(diagonal.size());
   coupled_.resize(diagonal.size());
-  for (int i = 0; i < n; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    NodeMatrix pivot = diagonal[k];
-    if (i > 0) pivot.noalias() -= coupled_[k - 1].transpose() * coupled_[k - 1];
-    const Eigen::LLT<NodeMatrix> llt(pivot);
+  for (std::size_t k = 0; k < diagonal.size(); ++k) {
+    Matrix pivot = diagonal[k];
+    if (k > 0) pivot.noalias() -= coupled_[k - 1].transpose() * coupled_[k - 1];
+    const Eigen::LLT<Matrix> llt(pivot);
     if (llt.info() != Eigen::Success) return false;
-    factor_[k] = llt.matrixL();
-    if (i + 1 < n) coupled_[k] = factor_[k].triangularView<Eigen::Lower>().solve(upper[k]);
+    inverse_[k] = llt.matrixL().solve(Matrix::Identity());
+    if (k + 1 < diagonal.size()) coupled_[k].noalias() = inverse_[k] * upper[k];
   }
-  Eigen::MatrixXd state(n * kNodeUnknowns, 1);
-  for (int i = 0; i < n; ++i) state.middleRows<kNodeUnknowns>(i * kNodeUnknowns) = right[static_cast<std::size_t>(i)];
-  forward(state);
-  if (border.cols() > 0) {
-    border_effect_ = border;
-    forward(border_effect_);
-    Eigen::MatrixXd schur = corner;
-    schur.selfadjointView<Eigen::Lower>().rankUpdate(border_effect_.transpose(), -1.0);
-    schur_.compute(schur);
-    if (schur_.info() != Eigen::Success) return false;
-    border_solution = schur_.solve(border_right - border_effect_.transpose() * state.col(0));
-    state -= border_effect_ * border_solution;
-    backward(border_effect_);
-  } else {
-    border_solution.resize(0);
-  }
-  backward(state);
-  if (!state.allFinite()) return false;
-  node_solution.resize(diagonal.size());
-  for (int i = 0; i < n; ++i)
-    node_solution[static_cast<std::size_t>(i)] = state.middleRows<kNodeUnknowns>(i * kNodeUnknowns);
   return true;
 }
 
-void BorderedSystem::node_covariances(std::vector<NodeMatrix>& own, std::vector<NodeMatrix>& with_next) const {
+template <int kUnknowns>
+bool BorderedChain<kUnknowns>::keep_solution(Eigen::MatrixXd& state) {
+  backward(state);
+  if (!state.allFinite()) return false;
+  node_solution.resize(diagonal.size());
+  for (int i = 0; i < nodes(); ++i)
+    node_solution[static_cast<std::size_t>(i)] = state.middleCols<kUnknowns>(i * kUnknowns).transpose();
+  return true;
+}
+
+template <int kUnknowns>
+Eigen::MatrixXd BorderedChain<kUnknowns>::right_row() const {
+  Eigen::MatrixXd row(1, nodes() * kUnknowns);
+  for (int i = 0; i < nodes(); ++i)
+    row.middleCols<kUnknowns>(i * kUnknowns) = right[static_cast<std::size_t>(i)].transpose();
+  return row;
+}
+
+template <int kUnknowns>
+bool BorderedChain<kUnknowns>::solve_nodes(const Eigen::VectorXd& border_held) {
+  if (!factor()) return false;
+  Eigen::MatrixXd state = right_row();
+  state.noalias() -= border_held.transpose() * border;
+  forward(state);
+  border_solution = border_held;
+  return keep_solution(state);
+}
+
+template <int kUnknowns>
+bool BorderedChain<kUnknowns>::solve() {
+  if (border_size() == 0) return solve_nodes(border_right);
+  if (!factor()) return false;
+  Eigen::MatrixXd state = right_row();
+  forward(state);
+  halfway_ = border;
+  forward(halfway_);
+  Eigen::MatrixXd schur = corner;
+  schur.selfadjointView<Eigen::Lower>().rankUpdate(halfway_, -1.0);
+  schur_.compute(schur);
+  if (schur_.info() != Eigen::Success) return false;
+  border_solution = schur_.solve(border_right - halfway_ * state.row(0).transpose());
+  state.row(0).noalias() -= border_solution.transpose() * halfway_;
+  return keep_solution(state);
+}
+
+template <int kUnknowns>
+void BorderedChain<kUnknowns>::node_covariances(std::vector<Matrix>& own, std::vector<Matrix>& with_next) const {
   own.resize(diagonal.size());
-  with_next.assign(diagonal.size(), NodeMatrix::Zero());
-  for (int i = nodes() - 1; i >= 0; --i) {
-    const auto k = static_cast<std::size_t>(i);
-    const NodeMatrix inverse = factor_[k].triangularView<Eigen::Lower>().solve(NodeMatrix::Identity());
-    own[k].noalias() = inverse.transpose() * inverse;
-    if (i + 1 == nodes()) continue;
-    const NodeMatrix gain = inverse.transpose() * coupled_[k];
+  with_next.assign(diagonal.size(), Matrix::Zero());
+  for (std::size_t k = diagonal.size(); k-- > 0;) {
+    own[k].noalias() = inverse_[k].transpose() * inverse_[k];
+    if (k + 1 == diagonal.size()) continue;
+    const Matrix gain = inverse_[k].transpose() * coupled_[k];
     with_next[k].noalias() = -gain * own[k + 1];
     own[k].noalias() -= with_next[k] * gain.transpose();
   }
 }
 
-void BorderedSystem::add_border_covariance(std::vector<NodeMatrix>& own) const {
-  if (border.cols() == 0) return;
-  // own += W S^-1 W^T with S = L L^T: the columns of L^-1 W^T, node by node.
-  const Eigen::MatrixXd half = schur_.matrixL().solve(border_effect_.transpose());
+template <int kUnknowns>
+void BorderedChain<kUnknowns>::add_border_covariance(std::vector<Matrix>& own) const {
+  if (border_size() == 0) return;
+  // own += W S^-1 W^T with W = inverse of the chain times border and S = L L^T: the columns of L^-1 W^T, node by node.
+  Eigen::MatrixXd half = schur_.matrixL().solve(halfway_);
+  backward(half);
   for (int i = 0; i < nodes(); ++i) {
-    const auto columns = half.middleCols<kNodeUnknowns>(i * kNodeUnknowns);
+    const auto columns = half.middleCols<kUnknowns>(i * kUnknowns);
     own[static_cast<std::size_t>(i)].noalias() += columns.transpose() * columns;
   }
 }
 
-Eigen::MatrixXd BorderedSystem::covariance_with(const Eigen::MatrixXd& functionals) const {
-  Eigen::MatrixXd columns = functionals;
-  forward(columns);
-  backward(columns);
-  if (border.cols() > 0) columns += border_effect_ * schur_.solve(border_effect_.transpose() * functionals);
-  return columns;
+template <int kUnknowns>
+Eigen::MatrixXd BorderedChain<kUnknowns>::covariance_with(const Eigen::MatrixXd& functionals) const {
+  Eigen::MatrixXd rows = functionals.transpose();
+  forward(rows);
+  if (border_size() > 0) rows += schur_.solve(halfway_ * rows.transpose()).transpose() * halfway_;
+  backward(rows);
+  return rows.transpose();
 }
 
-Eigen::MatrixXd BorderedSystem::deviations(const Eigen::MatrixXd& normal_values) const {
-  Eigen::MatrixXd columns = normal_values.topRows(nodes() * kNodeUnknowns);
-  backward(columns);
-  if (border.cols() > 0) columns -= border_effect_ * schur_.matrixU().solve(normal_values.bottomRows(border.cols()));
-  return columns;
+template <int kUnknowns>
+Eigen::MatrixXd BorderedChain<kUnknowns>::deviations(const Eigen::MatrixXd& normal_values) const {
+  Eigen::MatrixXd rows = normal_values.topRows(nodes() * kUnknowns).transpose();
+  if (border_size() > 0) rows -= schur_.matrixU().solve(normal_values.bottomRows(border_size())).transpose() * halfway_;
+  backward(rows);
+  return rows.transpose();
 }
 
-Eigen::MatrixXd BorderedSystem::border_covariance() const {
-  return border.cols() == 0 ? Eigen::MatrixXd(0, 0)
-                            : Eigen::MatrixXd(schur_.solve(Eigen::MatrixXd::Identity(border.cols(), border.cols())));
+template <int kUnknowns>
+Eigen::MatrixXd BorderedChain<kUnknowns>::border_covariance() const {
+  if (border_size() == 0) return Eigen::MatrixXd(0, 0);
+  return schur_.solve(Eigen::MatrixXd::Identity(border_size(), border_size()));
 }
+
+template class BorderedChain<kNodeUnknowns>;
+// Forgings of 4, 8 and 12 faces: two coordinates a corner, and the corners' radius.
+template class BorderedChain<9>;
+template class BorderedChain<17>;
+template class BorderedChain<25>;
 
 }  // namespace imprint

@@ -6,35 +6,40 @@
 
 namespace imprint {
 
-/// Unknowns of one node: y, y', z, z', radius and the support function's harmonics 2 to 6 (cosine, sine).
-inline constexpr int kNodeUnknowns = 15;
-using NodeMatrix = Eigen::Matrix<double, kNodeUnknowns, kNodeUnknowns>;
-using NodeVector = Eigen::Matrix<double, kNodeUnknowns, 1>;
-
-/// Normal equations of a chain of nodes, each coupled with the next, and of a border of unknowns that touch all:
-/// solved by block Cholesky in a time that grows with the number of nodes only.
-class BorderedSystem {
+/// Normal equations of a chain of nodes of `kUnknowns` unknowns each, each coupled with the next, and of a border of
+/// unknowns that touch all: solved by block Cholesky in a time that grows with the number of nodes only.
+/// Instantiated in bordered_system.cc for the sizes in use.
+template <int kUnknowns>
+class BorderedChain {
  public:
-  BorderedSystem(int nodes, int border);
+  using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+
+  BorderedChain(int nodes, int border);
+  /// Back to all zero, to be filled anew.
+  void clear();
 
   // The normal matrix and its right side, to be filled by adding.
-  std::vector<NodeMatrix> diagonal;  ///< (i, i), lower half used
-  std::vector<NodeMatrix> upper;     ///< (i, i + 1)
-  std::vector<NodeVector> right;
-  Eigen::MatrixXd border;  ///< (node unknowns, border)
+  std::vector<Matrix> diagonal;  ///< (i, i), lower half used
+  std::vector<Matrix> upper;     ///< (i, i + 1)
+  std::vector<Vector> right;
+  Eigen::MatrixXd border;  ///< (border, node unknowns): what one node has with the border lies together
   Eigen::MatrixXd corner;  ///< (border, border)
   Eigen::VectorXd border_right;
 
   /// Factors and solves; false when the matrix is not positive definite.
   [[nodiscard]] bool solve();
+  /// The same with the border's unknowns held at `border_held`, which takes a fraction of the time. Of what comes
+  /// after, only the solution and `node_covariances` are then there.
+  [[nodiscard]] bool solve_nodes(const Eigen::VectorXd& border_held);
   // After solve().
-  std::vector<NodeVector> node_solution;
+  std::vector<Vector> node_solution;
   Eigen::VectorXd border_solution;
 
   /// Covariances of every node with itself and with the next (the border held fixed): what variance estimates need.
-  void node_covariances(std::vector<NodeMatrix>& own, std::vector<NodeMatrix>& with_next) const;
+  void node_covariances(std::vector<Matrix>& own, std::vector<Matrix>& with_next) const;
   /// What the border's uncertainty adds to `own` of every node.
-  void add_border_covariance(std::vector<NodeMatrix>& own) const;
+  void add_border_covariance(std::vector<Matrix>& own) const;
   /// Inverse times `functionals` (node unknowns by columns): covariance of every unknown with those sums.
   [[nodiscard]] Eigen::MatrixXd covariance_with(const Eigen::MatrixXd& functionals) const;
   /// How far the nodes may lie from the solution: draws from the whole covariance, one a column of standard normal
@@ -44,16 +49,28 @@ class BorderedSystem {
   [[nodiscard]] Eigen::MatrixXd border_covariance() const;
 
   [[nodiscard]] int nodes() const { return static_cast<int>(diagonal.size()); }
+  [[nodiscard]] int border_size() const { return static_cast<int>(border_right.size()); }
 
  private:
-  void forward(Eigen::Ref<Eigen::MatrixXd> columns) const;
-  void backward(Eigen::Ref<Eigen::MatrixXd> columns) const;
+  [[nodiscard]] bool factor();
+  [[nodiscard]] Eigen::MatrixXd right_row() const;
+  [[nodiscard]] bool keep_solution(Eigen::MatrixXd& state);
+  // One a row, as `border` stands.
+  void forward(Eigen::MatrixXd& rows) const;
+  void backward(Eigen::MatrixXd& rows) const;
 
-  std::vector<NodeMatrix> factor_;   // L of each pivot block
-  std::vector<NodeMatrix> coupled_;  // L^-1 (i, i + 1)
-  Eigen::MatrixXd border_effect_;    // inverse of the chain times border
+  std::vector<Matrix> inverse_;  // of L of each pivot block
+  std::vector<Matrix> coupled_;  // L^-1 (i, i + 1)
+  Eigen::MatrixXd halfway_;      // border after `forward`
   // Of anything, so that a system can be moved before it is solved: an empty one has a state that is no value.
   Eigen::LLT<Eigen::MatrixXd> schur_{Eigen::MatrixXd::Identity(1, 1)};
 };
+
+/// Unknowns of one node of a round forging: y, y', z, z', radius and the support function's harmonics 2 to 6 (cosine,
+/// sine).
+inline constexpr int kNodeUnknowns = 15;
+using BorderedSystem = BorderedChain<kNodeUnknowns>;
+using NodeMatrix = BorderedSystem::Matrix;
+using NodeVector = BorderedSystem::Vector;
 
 }  // namespace imprint

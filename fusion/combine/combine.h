@@ -21,6 +21,18 @@ struct CombinedSection {
   double circularity_sigma_mm = 0.0;
 };
 
+/// What a section with faces says beside its mean width. Angles in degrees.
+struct SectionFacets {
+  struct Value {
+    double value = 0.0, sigma = 0.0;
+  };
+  std::vector<Value> widths_mm;             ///< across opposite faces, face by face; `convex`: least and largest width
+  Value squareness_deg;                     ///< of four faces: angle between the pairs, less 90
+  Value twist_deg;                          ///< about x, against the first section
+  Value corner_radius_mm;                   ///< the corners' mean
+  std::vector<Eigen::Vector2d> corners_mm;  ///< centres of the corners' circles, in the forging's y and z
+};
+
 /// The forging as all observations together show it, aligned.
 struct CombinedForging {
   Eigen::Matrix3d R_forging_world = Eigen::Matrix3d::Identity();  ///< for the first observation
@@ -32,6 +44,8 @@ struct CombinedForging {
   /// Forgings that the tangents would show as well as this one: together they say how sure anything made of several
   /// sections is. Empty where that is not known.
   std::vector<ForgingShape> draws;
+  SectionKind section_kind = SectionKind::round;
+  std::vector<SectionFacets> facets;  ///< one a section, where they are not round
   std::vector<std::string> warnings;
 };
 

@@ -185,8 +185,6 @@ void SectionPrior::learn_axis(std::span<const NodeVector> nodes, std::span<const
 
 void SectionPrior::learn_radius(std::span<const NodeVector> nodes, std::span<const NodeMatrix> own,
                                 std::span<const NodeMatrix> with_next) {
-  // Student's t with one degree of freedom: most steps small, a shoulder free.
-  constexpr double kFreedom = 1.0;
   const std::size_t steps = nodes.size() - 1;
   std::vector<double> squared(steps);
   std::vector<double> spread(steps);
@@ -195,6 +193,8 @@ void SectionPrior::learn_radius(std::span<const NodeVector> nodes, std::span<con
     squared[i] = gain * gain;
     spread[i] = own[i](kRadius, kRadius) + own[i + 1](kRadius, kRadius) - 2.0 * with_next[i](kRadius, kRadius);
   }
+  // Student's t with one degree of freedom: most steps small, a shoulder free.
+  constexpr double kFreedom = 1.0;
   for (int round = 0; round < 3; ++round) {
     const double variance = radius_density_ * step_mm_;
     Amount amount;

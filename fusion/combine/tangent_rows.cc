@@ -40,10 +40,20 @@ TangentRows tangent_rows(std::span<const ObservedForging> observations) {
   return all;
 }
 
-std::optional<TangentEquation> equation_of(TangentRow& row, const Viewer& viewer, const Placement& placement,
-                                           const RodSurface& rod, double length_mm, double margin_mm) {
-  const Eigen::Vector3d center = placement.point(viewer.center_world_mm);
-  const auto contact = rod.touch(center, placement.R * row.ray_world, row.x_mm);
+void set_place_effects(PlacedEquation& equation, const Eigen::Vector3d& center_mm, const Eigen::Vector3d& point_mm,
+                       const Eigen::Vector3d& surface_normal, double length_mm) {
+  const Eigen::Vector3d view = point_mm - center_mm;
+  equation.camera = surface_normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
+  // A move of the observation moves the point on the ray, and with it the value: seen from the model, the other way.
+  const Eigen::Vector3d lever = point_mm - Eigen::Vector3d(0.5 * length_mm, 0.0, 0.0);
+  equation.place.head<3>() = -surface_normal;
+  equation.place.tail<3>() = surface_normal.cross(lever);
+}
+
+std::optional<TangentEquation> equation_of(TangentRow& row, const ViewerPlaces& places, const RodSurface& rod,
+                                           double length_mm, double margin_mm) {
+  const Eigen::Vector3d center = places.center_of(row.viewer);
+  const auto contact = rod.touch(center, places.placement_of(row.viewer).R * row.ray_world, row.x_mm);
   if (!contact) return std::nullopt;
   row.x_mm = contact->nearest_x_mm;
   if (row.x_mm < margin_mm || row.x_mm > length_mm - margin_mm) return std::nullopt;
@@ -58,18 +68,11 @@ std::optional<TangentEquation> equation_of(TangentRow& row, const Viewer& viewer
   g(kZ) = contact->normal.y();
   g(kRadius) = 1.0;
   g.tail<2 * kHarmonics>() = contact->harmonics;
-  const Eigen::Vector3d& normal = contact->surface_normal;
-  const Eigen::Vector3d view = contact->point_mm - center;
-  equation.camera = normal.dot(view.cross(Eigen::Vector3d::UnitX()).normalized());
-  // A move of the observation moves the point on the ray, and with it the value: seen from the model, the other way.
-  const Eigen::Vector3d lever = contact->point_mm - Eigen::Vector3d(0.5 * length_mm, 0.0, 0.0);
-  equation.place.head<3>() = -normal;
-  equation.place.tail<3>() = normal.cross(lever);
+  set_place_effects(equation, center, contact->point_mm, contact->surface_normal, length_mm);
   return equation;
 }
 
-double rim_scatter(std::span<const TangentRow> rows, std::span<const std::optional<TangentEquation>> equations,
-                   std::span<const NodeVector> start) {
+double rim_scatter(std::span<const TangentRow> rows, std::span<const std::optional<double>> off_mm) {
   constexpr std::size_t kApart = 8;  // stations: some 25 px
   std::vector<double> bends;
   for (std::size_t r = 0; r + 2 * kApart < rows.size(); ++r) {
@@ -77,12 +80,9 @@ double rim_scatter(std::span<const TangentRow> rows, std::span<const std::option
     for (std::size_t k = r + 1; k <= r + 2 * kApart && same_rim; ++k) same_rim = rows[k].continues;
     const TangentRow &a = rows[r], &b = rows[r + kApart], &c = rows[r + 2 * kApart];
     if (!same_rim || !(a.trust > 0.0 && b.trust > 0.0 && c.trust > 0.0)) continue;
-    if (!equations[r] || !equations[r + kApart] || !equations[r + 2 * kApart]) continue;
-    const auto off = [&](std::size_t k) {
-      const TangentEquation& e = *equations[k];
-      return e.value_mm - e.coefficients.dot((1.0 - e.share) * start[e.node] + e.share * start[e.node + 1]);
-    };
-    bends.push_back(std::abs(off(r) - 2.0 * off(r + kApart) + off(r + 2 * kApart)) / std::sqrt(b.variance_mm2));
+    const auto &first = off_mm[r], &middle = off_mm[r + kApart], &last = off_mm[r + 2 * kApart];
+    if (!first || !middle || !last) continue;
+    bends.push_back(std::abs(*first - 2.0 * *middle + *last) / std::sqrt(b.variance_mm2));
   }
   if (bends.empty()) return 1.0;
   const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);

@@ -37,6 +37,8 @@ Measurement make_measurement(const CombinedForging& forging, std::vector<Measure
   measurement.straightness = evaluate_straightness(forging);
   measurement.diameters = evaluate_diameters(forging);
   measurement.roundness = evaluate_roundness(forging);
+  measurement.section_kind = forging.section_kind;
+  measurement.facets = forging.facets;
   measurement.shape = forging.shape;
   measurement.draws = forging.draws;
   measurement.max_deflection_mm = measurement.straightness.max_deflection.mm;

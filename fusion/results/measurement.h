@@ -53,6 +53,8 @@ struct Measurement {
   Diameters diameters;
   std::vector<Section> sections;
   std::vector<SectionRoundness> roundness;  ///< one a section; none where their shapes are not known
+  SectionKind section_kind = SectionKind::round;
+  std::vector<SectionFacets> facets;  ///< one a section, where they have faces
   std::vector<Station> stations;
   std::optional<Cooling> cooling;  ///< where the temperature is known; all else is of the hot forging
   Gain gain;

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 #include "fusion/results/measurement.h"
@@ -6,6 +8,7 @@ namespace imprint {
 namespace {
 
 constexpr const char* kSchema = "imprint.result/1";
+constexpr double kCi95 = 1.959964;  // standard deviations of a normal value
 
 void put(nlohmann::json& json, const std::string& name, const Length& length) {
   json[name + "_mm"] = length.mm;
@@ -71,6 +74,36 @@ void put_roundness(nlohmann::json& section, const SectionRoundness& roundness) {
 SectionRoundness roundness_from_json(const nlohmann::json& section) {
   return {length_from(section, "roundness_ls"), length_from(section, "roundness_mz"),
           length_from(section, "roundness_mc")};
+}
+
+nlohmann::json facet_value_to_json(const SectionFacets::Value& value) {
+  return {{"value", value.value}, {"ci95", kCi95 * value.sigma}};
+}
+
+nlohmann::json facets_to_json(const SectionFacets& facets) {
+  nlohmann::json json = {{"widths_mm", nlohmann::json::array()},
+                         {"squareness_deg", facet_value_to_json(facets.squareness_deg)},
+                         {"twist_deg", facet_value_to_json(facets.twist_deg)},
+                         {"corner_radius_mm", facet_value_to_json(facets.corner_radius_mm)},
+                         {"corners_mm", nlohmann::json::array()}};
+  for (const SectionFacets::Value& width : facets.widths_mm) json["widths_mm"].push_back(facet_value_to_json(width));
+  for (const Eigen::Vector2d& corner : facets.corners_mm) json["corners_mm"].push_back({corner.x(), corner.y()});
+  return json;
+}
+
+SectionFacets facets_from_json(const nlohmann::json& json) {
+  const auto value = [](const nlohmann::json& from) {
+    return SectionFacets::Value{from.at("value").get<double>(), from.at("ci95").get<double>() / kCi95};
+  };
+  SectionFacets facets{.widths_mm = {},
+                       .squareness_deg = value(json.at("squareness_deg")),
+                       .twist_deg = value(json.at("twist_deg")),
+                       .corner_radius_mm = value(json.at("corner_radius_mm")),
+                       .corners_mm = {}};
+  for (const nlohmann::json& width : json.at("widths_mm")) facets.widths_mm.push_back(value(width));
+  for (const nlohmann::json& corner : json.at("corners_mm"))
+    facets.corners_mm.emplace_back(corner.at(0).get<double>(), corner.at(1).get<double>());
+  return facets;
 }
 
 nlohmann::json section_to_json(const Measurement::Section& section) {
@@ -181,6 +214,7 @@ nlohmann::json to_json(const Measurement& measurement) {
   json["session"] = measurement.session;
   json["method"] = measurement.method;
   json["geometry"] = measurement.geometry;
+  json["section"] = name_of(measurement.section_kind);
   if (!measurement.line.empty()) json["line"] = measurement.line;
   if (!measurement.made_at.empty()) json["made_at"] = measurement.made_at;
   json["length_mm"] = measurement.length_mm;
@@ -208,6 +242,7 @@ nlohmann::json to_json(const Measurement& measurement) {
   for (std::size_t i = 0; i < measurement.sections.size(); ++i) {
     nlohmann::json section = section_to_json(measurement.sections[i]);
     if (i < measurement.roundness.size()) put_roundness(section, measurement.roundness[i]);
+    if (i < measurement.facets.size()) section["facets"] = facets_to_json(measurement.facets[i]);
     json["sections"].push_back(std::move(section));
   }
   json["observations"] = nlohmann::json::array();
@@ -229,6 +264,8 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     measurement.session = json.value("session", "");
     measurement.method = json.at("method").get<std::string>();
     measurement.geometry = json.value("geometry", "joint");
+    const auto kind = std::ranges::find(kSectionKinds, json.value("section", "round"));
+    if (kind != kSectionKinds.end()) measurement.section_kind = static_cast<SectionKind>(kind - kSectionKinds.begin());
     measurement.line = json.value("line", "");
     measurement.made_at = json.value("made_at", "");
     measurement.length_mm = json.at("length_mm").get<double>();
@@ -241,8 +278,10 @@ Result<Measurement> measurement_from_json(const nlohmann::json& json) {
     for (const nlohmann::json& section : json.at("sections")) {
       measurement.sections.push_back(section_from_json(section));
       if (section.contains("roundness_ls_mm")) measurement.roundness.push_back(roundness_from_json(section));
+      if (section.contains("facets")) measurement.facets.push_back(facets_from_json(section.at("facets")));
     }
     if (measurement.roundness.size() != measurement.sections.size()) measurement.roundness.clear();
+    if (measurement.facets.size() != measurement.sections.size()) measurement.facets.clear();
     if (json.contains("straightness")) measurement.straightness = straightness_from_json(json.at("straightness"));
     if (json.contains("diameters")) measurement.diameters = diameters_from_json(json.at("diameters"));
     if (json.contains("diameters"))

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <Eigen/Dense>
 
+#include "fusion/triangulate/faceted_rod.h"
 #include "fusion/triangulate/first_axis.h"
 #include "fusion/triangulate/rim_tangents.h"
 
@@ -169,10 +170,13 @@ Result<Agreement> agreement_of(std::vector<CameraView> views, const ForgingSpec&
   auto line = line_through(points, forging.axis_direction_world, config.sections);
   if (!line) return pass_on(line.error());
   Agreement agreement{.views = std::move(views), .rod = {}};
-  agreement.rod = agree_on_rod(agreement.views, over_rims(*line, rim_tangents(agreement.views, *line)), forging);
+  AxisCurve first = over_rims(*line, rim_tangents(agreement.views, *line));
+  agreement.rod = config.faceted() ? faceted_rod(agreement.views, std::move(first))
+                                   : agree_on_rod(agreement.views, std::move(first), forging);
   std::vector<Testimony> all;
   for (const CameraView& view : agreement.views) all.push_back(testimony(view, agreement.rod));
-  agreement.contradiction_mm = std::max(width_misfit(all), place_misfit(all));
+  // The widths of a faceted forging say nothing of a camera.
+  agreement.contradiction_mm = std::max(config.faceted() ? 0.0 : width_misfit(all), place_misfit(all));
   agreement.misfit_mm = std::max(agreement.contradiction_mm, end_misfit(all));
   return agreement;
 }

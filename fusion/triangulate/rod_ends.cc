@@ -66,7 +66,7 @@ RimStops rim_stops(std::span<const CameraView> views, const RodConsensus& rod) {
 }
 
 std::vector<Candidate> candidates(std::span<const CameraView> views, const RodConsensus& rod, double end_section_mm,
-                                  bool last) {
+                                  double out_of_round_share, bool last) {
   const AxisCurve& axis = rod.axis;
   const double x_end = axis.x_first_mm + axis.x_step_mm * static_cast<double>(axis.yz_mm.size() - 1);
   const double radius = last ? rod.median_radius_mm(x_end - end_section_mm, x_end)
@@ -80,9 +80,9 @@ std::vector<Candidate> candidates(std::span<const CameraView> views, const RodCo
     const double range = (met - view.pose.center_world_mm).norm();
     const double along_ray = end.direction_world.dot(axis.at(*x).direction);
     const double across = std::sqrt(std::max(1e-3, 1.0 - along_ray * along_ray));
-    // Seen aslant, an out-of-round rim (1 % of the radius) shifts the reading along the axis.
-    const double sigma =
-        std::hypot(end.sigma_px * range / view.focal_length_px / across, 0.01 * radius * along_ray / across);
+    // Seen aslant, an out-of-round rim shifts the reading along the axis.
+    const double sigma = std::hypot(end.sigma_px * range / view.focal_length_px / across,
+                                    0.5 * out_of_round_share * radius * along_ray / across);
     const Eigen::Vector3d beside = axis.R_line * (met - axis.at(*x).point_mm);
     found.push_back(
         {.reading = {.camera = view.camera, .last = last, .ray_world = end.direction_world, .sigma_mm = sigma},
@@ -112,7 +112,7 @@ std::span<Candidate> largest_group(std::span<Candidate> sorted, double tolerance
 }  // namespace
 
 RodEnds find_ends(std::span<const CameraView> views, const RodConsensus& rod, std::span<const std::string> ids,
-                  double end_section_mm) {
+                  double end_section_mm, double out_of_round_share) {
   RodEnds ends;
   std::vector<EndPoint> points;
   const RimStops stops = rim_stops(views, rod);
@@ -120,7 +120,7 @@ RodEnds find_ends(std::span<const CameraView> views, const RodConsensus& rod, st
   for (const bool last : {false, true}) {
     const char* name = last ? "last" : "first";
     const double stop = last ? stops.last_mm : stops.first_mm;
-    std::vector<Candidate> all = candidates(views, rod, end_section_mm, last);
+    std::vector<Candidate> all = candidates(views, rod, end_section_mm, out_of_round_share, last);
     double widest_sigma = 0.0;
     for (const Candidate& one : all) widest_sigma = std::max(widest_sigma, one.reading.sigma_mm);
     const std::span<Candidate> group = largest_group(all, std::max(0.04 * radius, 4.0 * widest_sigma), stop);

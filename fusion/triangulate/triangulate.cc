@@ -5,6 +5,7 @@
 #include <set>
 
 #include "fusion/triangulate/consistency.h"
+#include "fusion/triangulate/faceted_rod.h"
 #include "fusion/triangulate/rod_consensus.h"
 #include "fusion/triangulate/rod_ends.h"
 #include "fusion/triangulate/triangulate_config.h"
@@ -117,14 +118,16 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
   }
 
   RodConsensus rod = std::move(agreeing->rod);
-  RodEnds ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm);
+  RodEnds ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm, config.out_of_round_share);
   for (int iteration = 0; iteration < 2; ++iteration) {
     // Beyond the ends the outline follows the end circles, or something else, which must not bend the axis.
     const double length = ends.planes.last.x_mm - ends.planes.first.x_mm;
     if (!(length > rod.median_radius_mm(ends.planes.first.x_mm, ends.planes.last.x_mm)))
       return job_failed("the ends seen by the cameras lie {:.1f} mm apart, which is no rod", length);
-    rod = agree_on_rod(agreeing->views, over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm), forging);
-    ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm);
+    AxisCurve between = over(rod.axis, ends.planes.first.x_mm, ends.planes.last.x_mm);
+    rod = config.faceted() ? faceted_rod(agreeing->views, std::move(between))
+                           : agree_on_rod(agreeing->views, std::move(between), forging);
+    ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm, config.out_of_round_share);
   }
   observed.warnings.insert(observed.warnings.end(), ends.warnings.begin(), ends.warnings.end());
   observed.radius_mm = rod.median_radius_mm(ends.planes.first.x_mm, ends.planes.last.x_mm);

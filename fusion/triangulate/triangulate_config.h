@@ -14,6 +14,13 @@ struct TriangulateConfig {
   double max_ray_distance_share = 0.25;  ///< of the largest diameter: limit of [D] equation 2 on the distance of rays
   double max_disagreement_share = 0.04;  ///< of the diameter: a camera this far from the others contradicts them (ours)
 
+  /// How far a section's rims may lie from a circle, of the radius, and still be the forging's: out-of-round (ours).
+  double out_of_round_share = kRoundShare;
+
+  static constexpr double kRoundShare = 0.02;
+  static constexpr double kFacetedShare = 0.25;  ///< a square's corners stand out by two fifths of its half width
+
+  [[nodiscard]] bool faceted() const { return out_of_round_share > kRoundShare; }
   [[nodiscard]] Result<void> validate() const;
 };
 

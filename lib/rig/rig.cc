@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/ranges.h>
+
 #include "lib/camera/camera_file.h"
 #include "lib/config/toml_file.h"
 #include "lib/config/unknown_keys.h"
@@ -33,6 +35,14 @@ ForgingSpec read_forging(TomlReader& read) {
   forging.polarity = polarity == "dark" ? Polarity::dark : Polarity::bright;
   if (polarity != "bright" && polarity != "dark") {
     read.fault("forging.polarity", fmt::format("expected \"bright\" or \"dark\", found \"{}\"", polarity));
+  }
+  const auto section = read.string("forging.section", std::string(name_of(SectionKind::unknown)));
+  const auto known = std::find(kSectionKinds.begin(), kSectionKinds.end(), section);
+  if (known == kSectionKinds.end()) {
+    read.fault("forging.section",
+               fmt::format("expected one of {}, found \"{}\"", fmt::join(kSectionKinds, ", "), section));
+  } else {
+    forging.section = static_cast<SectionKind>(known - kSectionKinds.begin());
   }
   return forging;
 }
@@ -84,8 +94,8 @@ Result<Rig> read_rig(const std::filesystem::path& path) {
   auto cameras = read_cameras(path, read, rig.warnings);
   note_unknown_keys(path, *table, "", {"field", "library", "camera", "forging"}, rig.warnings);
   if (const toml::table* forging = (*table)["forging"].as_table()) {
-    note_unknown_keys(path, *forging, "forging.", {"diameter_mm", "axis_direction", "end_section_mm", "polarity"},
-                      rig.warnings);
+    note_unknown_keys(path, *forging, "forging.",
+                      {"diameter_mm", "axis_direction", "end_section_mm", "polarity", "section"}, rig.warnings);
   }
   if (read.error()) return pass_on(*read.error());
   if (!cameras) return pass_on(cameras.error());

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,6 +19,12 @@ namespace imprint {
 
 enum class Polarity { bright, dark };
 
+/// Shape of a forging's sections. `unknown`: told by how its widths change from one observation to the next.
+enum class SectionKind { unknown, round, square, rectangle, octagon, convex };
+inline constexpr std::array<std::string_view, 6> kSectionKinds{"auto",      "round",   "square",
+                                                               "rectangle", "octagon", "convex"};
+constexpr std::string_view name_of(SectionKind kind) { return kSectionKinds[static_cast<std::size_t>(kind)]; }
+
 /// What the cameras of one line look at.
 struct ForgingSpec {
   double diameter_min_mm = 0.0;
@@ -24,6 +32,7 @@ struct ForgingSpec {
   Eigen::Vector3d axis_direction_world = Eigen::Vector3d::UnitX();  ///< rough; length 1
   double end_section_mm = 80.0;  ///< length of the two end sections that define the ideal axis
   Polarity polarity = Polarity::bright;
+  SectionKind section = SectionKind::unknown;
 };
 
 /// `rig.toml` with all that it names, read.

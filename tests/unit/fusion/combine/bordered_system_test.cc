@@ -37,7 +37,7 @@ struct Twin {
         system.upper[k] = dense.block<kNodeUnknowns, kNodeUnknowns>(i * kNodeUnknowns, (i + 1) * kNodeUnknowns);
       system.right[k] = right.segment<kNodeUnknowns>(i * kNodeUnknowns);
     }
-    system.border = dense.topRightCorner(kNodes * kNodeUnknowns, kBorder);
+    system.border = dense.bottomLeftCorner(kBorder, kNodes * kNodeUnknowns);
     system.corner = dense.bottomRightCorner<kBorder, kBorder>();
     system.border_right = right.tail<kBorder>();
   }
@@ -54,6 +54,20 @@ TEST_CASE("bordered_system: draws spread as the whole covariance says, across no
   const Eigen::MatrixXd spread = draws * draws.transpose();
   const Eigen::MatrixXd expected = inverse.topLeftCorner(kSize - kBorder, kSize - kBorder);
   CHECK((spread - expected).cwiseAbs().maxCoeff() < 1e-9 * expected.cwiseAbs().maxCoeff());
+}
+
+TEST_CASE("bordered_system: with the border held, the nodes are what the dense system makes of the rest") {
+  Twin twin;
+  const Eigen::VectorXd held = Eigen::VectorXd::Constant(kBorder, 0.3);
+  REQUIRE(twin.system.solve_nodes(held));
+  constexpr int kInner = kSize - kBorder;
+  const Eigen::VectorXd rest = twin.right.head(kInner) - twin.dense.topRightCorner(kInner, kBorder) * held;
+  const Eigen::VectorXd expected = twin.dense.topLeftCorner(kInner, kInner).llt().solve(rest);
+  for (int i = 0; i < kNodes; ++i)
+    CHECK((twin.system.node_solution[static_cast<std::size_t>(i)] -
+           expected.segment<kNodeUnknowns>(i * kNodeUnknowns))
+              .norm() < 1e-8 * expected.norm());
+  CHECK(twin.system.border_solution == held);
 }
 
 TEST_CASE("bordered_system: solution and covariances are those of the dense system") {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/core.h>
+#include <Eigen/Geometry>
 
 namespace imprint::test {
 
@@ -34,7 +35,30 @@ bool near_shoulder(double x) {
   return (x > 390.0 && x < 437.0) || (x > 1090.0 && x < 1124.0) || (x > 1490.0 && x < 1530.0);
 }
 
-Session observe(const Rod& rod, const Views& views) {
+Session observe(const Rod& rod, const Views& views) { return observe_hull(std::span(&rod, 1), views); }
+
+std::vector<Rod> edges_of(const FacetedBar& bar) {
+  const Rod spine = bent_rod(1.0, bar.bow_mm);
+  const double half = 0.5 * bar.width_mm - bar.corner_radius_mm;
+  const double reach = half / std::cos(M_PI / bar.corners);
+  std::vector<Rod> edges;
+  for (int i = 0; i < bar.corners; ++i) {
+    const double angle = 2.0 * M_PI * (i + 0.5) / bar.corners;
+    const Eigen::Vector2d corner =
+        Eigen::Vector2d(reach * std::cos(angle), reach * std::sin(angle) + (bar.stretch - 1.0) * 0.5 * bar.width_mm *
+                                                                               (std::sin(angle) > 0.0 ? 1.0 : -1.0));
+    Rod edge = spine;
+    edge.radius = [bar](double) { return bar.corner_radius_mm; };
+    edge.axis = [spine, corner, bar](double x) {
+      const double turn = (bar.turn_deg + bar.twist_deg * x / spine.length_mm) * M_PI / 180.0;
+      return Eigen::Vector2d(spine.axis(x) + Eigen::Rotation2Dd(turn) * corner);
+    };
+    edges.push_back(std::move(edge));
+  }
+  return edges;
+}
+
+Session observe_hull(std::span<const Rod> rods, const Views& views) {
   std::mt19937 generator(views.seed);
   std::normal_distribution<double> normal;
   Session session;
@@ -53,7 +77,7 @@ Session observe(const Rod& rod, const Views& views) {
     std::vector<Imprint> imprints;
     for (const Pinhole& camera : forge_cameras(views.scale)) {
       if (imprints.size() == views.cameras) break;
-      Imprint imprint = view_rod(rod, lying, camera);
+      Imprint imprint = view_hull(rods, lying, camera);
       if (views.noise_px > 0.0) add_noise(imprint, views.noise_px, generator);
       if (views.pose_sigma_mm > 0.0) {
         const double turn = views.pose_sigma_mm / 7400.0 / views.scale;

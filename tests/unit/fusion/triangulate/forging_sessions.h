@@ -47,6 +47,16 @@ struct Views {
 
 /// The forge's cameras look at the rod, placed as a manipulator does: to 1 mm, 0.3 deg of tilt and of turn.
 Session observe(const Rod& rod, const Views& views);
+/// The same of the hull of rods.
+Session observe_hull(std::span<const Rod> rods, const Views& views);
+
+/// The edges of a bent forging with `corners` faces whose section is the image of a regular polygon `width_mm` across,
+/// `stretch` times as wide along its z, turned by `turn_deg` and twisted by `twist_deg` over the length.
+struct FacetedBar {
+  int corners = 4;
+  double width_mm = 300.0, stretch = 1.0, corner_radius_mm = 25.0, turn_deg = 11.0, twist_deg = 0.0, bow_mm = 8.0;
+};
+std::vector<Rod> edges_of(const FacetedBar& bar);
 
 /// `measured` has sections; those next to the stepped rod's shoulders may be skipped.
 Deviation deviation(const Measurement& measured, const Rod& rod, const Session& session, bool skip_shoulders = false);

@@ -204,6 +204,11 @@ std::vector<Pinhole> forge_cameras(double scale) {
 }
 
 Imprint view_rod(const Rod& rod, const Lying& lying, const Pinhole& camera) {
+  return view_hull(std::span(&rod, 1), lying, camera);
+}
+
+Imprint view_hull(std::span<const Rod> rods, const Lying& lying, const Pinhole& camera) {
+  const double length_mm = rods.front().length_mm;
   Imprint imprint;
   imprint.camera_id = camera.id;
   imprint.focal_length_px = camera.focal_length_px;
@@ -213,59 +218,75 @@ Imprint view_rod(const Rod& rod, const Lying& lying, const Pinhole& camera) {
   imprint.quality.edge_points = 2000;
   imprint.method = "best";
 
-  Scene scene{rod, lying, camera, {}};
+  std::vector<Scene> scenes;
+  for (const Rod& rod : rods) scenes.push_back({rod, lying, camera, {}});
   const auto axis_point = [&](double x) {
-    const Eigen::Vector2d yz = rod.axis(x);
-    return scene.project({x, yz.x(), yz.y()});
+    Eigen::Vector2d yz = Eigen::Vector2d::Zero();
+    for (const Rod& rod : rods) yz += rod.axis(x) / static_cast<double>(rods.size());
+    return scenes.front().project({x, yz.x(), yz.y()});
   };
   const IdealPoint a = axis_point(0.0);
-  const IdealPoint b = axis_point(rod.length_mm);
+  const IdealPoint b = axis_point(length_mm);
   const double length = std::hypot(b.x_px - a.x_px, b.y_px - a.y_px);
   // Stations run to the right in the image, whichever way the rod lies.
   const double direction = b.x_px > a.x_px ? 1.0 : -1.0;
-  scene.grid.origin = {0.5 * (a.x_px + b.x_px), 0.5 * (a.y_px + b.y_px)};
-  scene.grid.direction_x = direction * (b.x_px - a.x_px) / length;
-  scene.grid.direction_y = direction * (b.y_px - a.y_px) / length;
+  StationGrid grid;
+  grid.origin = {0.5 * (a.x_px + b.x_px), 0.5 * (a.y_px + b.y_px)};
+  grid.direction_x = direction * (b.x_px - a.x_px) / length;
+  grid.direction_y = direction * (b.y_px - a.y_px) / length;
+  for (Scene& scene : scenes) scene.grid = grid;
 
   std::array<ImprintEnd, 2> ends;
   for (int end = 0; end < 2; ++end) {
     const double sign = end == 0 ? -1.0 : 1.0;
-    const double x = (end == 1) == (direction > 0.0) ? rod.length_mm : 0.0;
+    const double x = (end == 1) == (direction > 0.0) ? length_mm : 0.0;
     double best = -std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 3600; ++i) {
-      const ImagePoint p = scene.at(x, i * 0.1 * kDegree);
-      if (sign * p.station <= best) continue;
-      best = sign * p.station;
-      ends[static_cast<std::size_t>(end)] = {
-          .station_px = p.station, .offset_px = p.offset, .sigma_px = 0.1, .visible = true};
+    for (const Scene& scene : scenes) {
+      for (int i = 0; i < 3600; ++i) {
+        const ImagePoint p = scene.at(x, i * 0.1 * kDegree);
+        if (sign * p.station <= best) continue;
+        best = sign * p.station;
+        ends[static_cast<std::size_t>(end)] = {
+            .station_px = p.station, .offset_px = p.offset, .sigma_px = 0.1, .visible = true};
+      }
     }
   }
   imprint.start = ends[0];
   imprint.end = ends[1];
-  scene.grid.start_px = ends[0].station_px + 0.5;
-  scene.grid.step_px = (ends[1].station_px - ends[0].station_px - 1.0) / (kImprintStations - 1);
-  imprint.grid = scene.grid;
+  grid.start_px = ends[0].station_px + 0.5;
+  grid.step_px = (ends[1].station_px - ends[0].station_px - 1.0) / (kImprintStations - 1);
+  imprint.grid = grid;
 
   // Normals square to the view: where offsets are largest and smallest.
-  double theta_lower = 0.0;
-  double theta_upper = 0.0;
-  double largest = -std::numeric_limits<double>::infinity();
-  double smallest = -largest;
-  for (int i = 0; i < 360; ++i) {
-    const double offset = scene.at(0.5 * rod.length_mm, i * kDegree).offset;
-    if (offset > largest) {
-      largest = offset;
-      theta_lower = i * kDegree;
+  struct Outer {
+    double upper, lower;
+  };
+  std::vector<Outer> normals;
+  for (const Scene& scene : scenes) {
+    Outer outer{0.0, 0.0};
+    double largest = -std::numeric_limits<double>::infinity();
+    double smallest = -largest;
+    for (int i = 0; i < 360; ++i) {
+      const double offset = scene.at(0.5 * length_mm, i * kDegree).offset;
+      if (offset > largest) {
+        largest = offset;
+        outer.lower = i * kDegree;
+      }
+      if (offset < smallest) {
+        smallest = offset;
+        outer.upper = i * kDegree;
+      }
     }
-    if (offset < smallest) {
-      smallest = offset;
-      theta_upper = i * kDegree;
-    }
+    normals.push_back(outer);
   }
   for (std::size_t i = 0; i < kImprintStations; ++i) {
-    const double station = scene.grid.station_px(i);
-    const double lower = scene.rim(station, theta_lower, 1.0);
-    const double upper = -scene.rim(station, theta_upper, -1.0);
+    const double station = grid.station_px(i);
+    double lower = -std::numeric_limits<double>::infinity(), above = lower;
+    for (std::size_t k = 0; k < scenes.size(); ++k) {
+      lower = std::max(lower, scenes[k].rim(station, normals[k].lower, 1.0));
+      above = std::max(above, scenes[k].rim(station, normals[k].upper, -1.0));
+    }
+    const double upper = -above;
     const double weight = std::isfinite(lower) && std::isfinite(upper) ? 1.0 : 0.0;
     imprint.upper.offset_px.push_back(weight > 0.0 ? upper : 0.0);
     imprint.lower.offset_px.push_back(weight > 0.0 ? lower : 0.0);

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,9 @@ std::vector<Pinhole> forge_cameras(double scale = 1.0);
 
 /// Exact imprint: rims by maximising over the surface, arcs of the end circles included, 500 stations.
 Imprint view_rod(const Rod& rod, const Lying& lying, const Pinhole& camera);
+/// The same of the hull of several rods of one length, each of which is touched where it stands furthest out: of a
+/// forging with faces, one rod at each of its rounded edges.
+Imprint view_hull(std::span<const Rod> rods, const Lying& lying, const Pinhole& camera);
 
 /// Normal noise on the curves and ends, the same for axis and rims as an edge finder would give.
 void add_noise(Imprint& imprint, double sigma_px, std::mt19937& generator);
