@@ -196,15 +196,15 @@ class LiveLineTest(unittest.TestCase):
         images = pathlib.Path(tempfile.mkdtemp(dir=work))
         for camera in ("cam1", "cam2", "cam3"):
             picture = (data / f"obs00_{camera}.png").read_bytes()
-            (images / f"obs00_{camera}.png").write_bytes(picture[: len(picture) // 2] if camera == "cam2" else picture)
+            (images / f"obs00_{camera}.png").write_bytes(picture[: len(picture) // 2] if camera == "cam3" else picture)
         with Line(images=images) as line:
             line.start_fusion()
             line.start_nodes("cam1", "cam2", "cam3")
             line.wait_alive("cam1", "cam2", "cam3")
             result = line.trigger(0, 1)
-            self.assertTrue(any("cam2" in warning and "obs00_cam2.png" in warning for warning in result["warnings"]),
+            self.assertTrue(any("cam3" in warning and "obs00_cam3.png" in warning for warning in result["warnings"]),
                             result["warnings"])
-            health = line.wait_for(lambda status: status["cameras"][1]["health"]["failed_frames"] == 1, "health of cam2")
+            health = line.wait_for(lambda status: status["cameras"][2]["health"]["failed_frames"] == 1, "health of cam3")
             self.assertEqual(health["cameras"][0]["health"]["failed_frames"], 0)
 
     def test_no_fusion_no_trigger(self):

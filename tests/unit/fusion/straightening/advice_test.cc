@@ -84,7 +84,8 @@ TEST_CASE("straightening: a long bow takes more strokes, each leaving less") {
     CHECK(stroke.predicted_max_deflection_mm < before);
     before = stroke.predicted_max_deflection_mm;
   }
-  CHECK(advice->strokes[0].predicted_max_deflection_mm < 0.5 * arc.max_deflection_mm);
+  // They are chosen together: the first alone need not be the best one stroke, all of them leave little.
+  CHECK(before < 0.1 * arc.max_deflection_mm);
 }
 
 TEST_CASE("straightening: springback is learnt from strokes measured before and after") {
