@@ -269,14 +269,15 @@ def alarms(status):
 def node_disk_full(work, ready):
     with ReadyLine(work, ready) as line, small_disk(line.folder / "imprint-data", 256):
         line.start_all()
+        # A disk of 256 kB also stays below `alarm.min_storage_mb`: that alarm is right throughout.
         spools = {f"spool_{camera}" for camera in CAMERAS}
         with filled(line.folder / "imprint-data"):
             line.trigger_until_taken("S0")
             line.wait_for_results(["S0"])  # measuring goes on
-            line.wait_for(lambda status: alarms(status) == spools, "an alarm of every node")
+            line.wait_for(lambda status: spools <= alarms(status), "an alarm of every node")
         line.trigger_until_taken("S1")
         line.wait_for_results(["S1"])
-        line.wait_for(lambda status: not alarms(status), "no alarm any more")
+        line.wait_for(lambda status: not spools & alarms(status), "no alarm of a spool any more")
         line.kill_all()
         return line.account()
 
