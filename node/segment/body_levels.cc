@@ -105,7 +105,7 @@ class BodyWalk {
     const auto count = static_cast<double>(values_.size());
     ++unsure_;
     if (same < kNothing * count) return -kAir;
-    if (same > kSurely * count) {
+    if (same > kSurely * count && near > 0) {
       unsure_ = std::max(0, unsure_ - 4);
       brightness_ += kMemory * (static_cast<float>(sum / near) - brightness_);
       ground_ += kGroundMemory * (levels_.ground[static_cast<std::size_t>(x)] - ground_);

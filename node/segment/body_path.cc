@@ -64,12 +64,6 @@ double BodyPath::median_width_px() const {
   return *middle;
 }
 
-double BodyPath::mean_weight() const {
-  double sum = 0;
-  for (const Column& c : columns) sum += c.pair.weight;
-  return sum / std::max(1, length_px());
-}
-
 BodyPath follow_body(const RimPairs& rim_pairs, const WorkingImage& working, const AxisLine& line, double max_offset_px,
                      double max_gap_widths) {
   const auto& pairs = rim_pairs.columns;

@@ -18,7 +18,6 @@ struct BodyPath {
   [[nodiscard]] bool empty() const { return columns.empty(); }
   [[nodiscard]] int length_px() const { return empty() ? 0 : columns.back().x_px - columns.front().x_px + 1; }
   [[nodiscard]] double median_width_px() const;
-  [[nodiscard]] double mean_weight() const;  ///< over its whole length, gaps counting 0
 };
 
 /// The best chain of rim pairs near `line` (Viterbi along the columns). Widths may jump (steps of a forging) at a

@@ -101,10 +101,10 @@ void cut_ends(BodyPath& path, const BodyLevels& levels, int inside_x_px) {
 }
 
 // Cuts off what goes on behind an end without proof: on either side of `inside_x_px` the body ends where its columns
-// together speak for it most.
-void cut_unproven(BodyPath& path, const BodyProof& proof, int inside_x_px) {
+// together speak for it most. Whether anything was cut.
+bool cut_unproven(BodyPath& path, const BodyProof& proof, int inside_x_px) {
   constexpr double kNeither = 0.46;  // a column that speaks neither for the body nor against it
-  if (path.empty()) return;
+  if (path.empty()) return false;
   const int n = static_cast<int>(path.columns.size());
   const int inside = std::clamp(inside_x_px - path.columns.front().x_px, 0, n - 1);
   int ends[2] = {inside, inside};
@@ -116,6 +116,7 @@ void cut_unproven(BodyPath& path, const BodyProof& proof, int inside_x_px) {
     }
   }
   path.columns = {path.columns.begin() + ends[0], path.columns.begin() + ends[1] + 1};
+  return static_cast<int>(path.columns.size()) < n;
 }
 
 // The body about its own axis, then once more with its brightness known.
@@ -153,8 +154,8 @@ void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& r
     body.whole =
         trace_rims(working, body.axis, levels, rims, width, 0.4 * pairs.min_width_px, 0.6 * pairs.max_width_px);
     cut_ends(body.whole, levels, inside);
-    cut_unproven(body.whole, prove_body(body.whole, working, levels), inside);
     body.proof = prove_body(body.whole, working, levels);
+    if (cut_unproven(body.whole, body.proof, inside)) body.proof = prove_body(body.whole, working, levels);
     if (body.whole.empty()) break;
     for (auto& column : body.whole.columns) column.pair.weight = column.pair.both ? 1.0F : kUnproven;
     const AxisLine refined = fit_axis(body.whole, body.axis);
