@@ -20,21 +20,54 @@ double step_slope(double t) { return 30.0 * t * t * (1.0 - t) * (1.0 - t); }
 
 Eigen::Vector2d direction(double phi) { return {std::cos(phi), std::sin(phi)}; }
 
+double width_at(const SectionShape& section, double phi) {
+  return section.support(phi).h + section.support(phi + pi).h;
+}
+
 double circularity(const SectionShape& section) {
   double smallest = 1e30, largest = -1e30;
   for (int i = 0; i < width_directions; ++i) {
-    const double phi = pi * i / width_directions;
-    const double width = section.support(phi).h + section.support(phi + pi).h;
+    const double width = width_at(section, pi * i / width_directions);
     smallest = std::min(smallest, width);
     largest = std::max(largest, width);
   }
   return 0.5 * (largest - smallest);
 }
 
+/// Points all over a section's boundary, each with the length of boundary that it stands for.
+struct BoundaryPoints {
+  std::vector<Eigen::Vector2d> at;
+  std::vector<double> length;
+};
+
+/// A face is passed within a hundredth of a degree: of sections with faces the boundary is walked in chords, each cut
+/// into pieces.
+BoundaryPoints walk(const SectionShape& section) {
+  constexpr double piece_mm = 2.0;
+  constexpr int count = 2 * width_directions;
+  BoundaryPoints points;
+  Eigen::Vector2d from = section.boundary(0.0);
+  for (int i = 1; i <= count; ++i) {
+    const Eigen::Vector2d to = section.boundary(2.0 * pi * i / count);
+    const double length = (to - from).norm();
+    const int pieces = 1 + static_cast<int>(length / piece_mm);
+    for (int k = 0; k < pieces; ++k) {
+      points.at.emplace_back(from + (to - from) * (k + 0.5) / pieces);
+      points.length.push_back(length / pieces);
+    }
+    from = to;
+  }
+  return points;
+}
+
 }  // namespace
 
 SectionShape::Support SectionShape::support(double phi) const {
   Support s{radius, 0.0, 0.0, radius_dx, 0.0};
+  if (polygon.faces() > 0) {
+    const PolygonSection::Support p = polygon.support(phi);
+    s = {p.h, p.h_phi, p.h_phiphi, p.h_x, p.h_xphi};
+  }
   const double c1 = std::cos(phi), s1 = std::sin(phi);
   double cn = c1, sn = s1;
   for (int i = 0; i < harmonics; ++i) {
@@ -68,31 +101,38 @@ Eigen::Vector2d SectionShape::boundary(double phi) const {
 
 SectionTruth section_truth(const SectionShape& section) {
   constexpr int count = 2 * width_directions;
-  Eigen::Matrix<double, count, 2> points;
-  Eigen::Matrix<double, count, 1> h, weights;  // weight: share of the boundary's length
+  Eigen::Matrix<double, count, 1> h;
+  BoundaryPoints boundary;
   for (int i = 0; i < count; ++i) {
     const double phi = 2.0 * pi * i / count;
     const SectionShape::Support s = section.support(phi);
     h[i] = s.h;
-    weights[i] = s.h + s.h_phiphi;
-    points.row(i) = (section.center + s.h * direction(phi) + s.h_phi * direction(phi + 0.5 * pi)).transpose();
+    boundary.at.emplace_back(section.center + s.h * direction(phi) + s.h_phi * direction(phi + 0.5 * pi));
+    boundary.length.push_back(s.h + s.h_phiphi);
   }
   const auto widths = (h.head<width_directions>() + h.tail<width_directions>()).eval();
   SectionTruth truth;
   truth.diameter_mm = widths.mean();
-  truth.circularity_mm = 0.5 * (widths.maxCoeff() - widths.minCoeff());
+  double narrowest = widths.minCoeff();
+  const int faces = section.polygon.faces();
+  for (int k = 0; k < faces / 2; ++k) {
+    truth.widths_mm.push_back(width_at(section, section.polygon.first_face_rad + 2.0 * pi * k / faces));
+    narrowest = std::min(narrowest, truth.widths_mm.back());  // half a degree beside it is a millimetre too wide
+  }
+  truth.circularity_mm = 0.5 * (widths.maxCoeff() - narrowest);
+  if (faces > 0) boundary = walk(section);
 
   // Gauss-Newton on the distance from a circle: centre and radius.
   Eigen::Vector3d circle(section.center.x(), section.center.y(), 0.5 * truth.diameter_mm);
   for (int iteration = 0; iteration < 4; ++iteration) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (int i = 0; i < count; ++i) {
-      const Eigen::Vector2d from_center = points.row(i).transpose() - circle.head<2>();
+    for (std::size_t i = 0; i < boundary.at.size(); ++i) {
+      const Eigen::Vector2d from_center = boundary.at[i] - circle.head<2>();
       const double distance = from_center.norm();
       const Eigen::Vector3d gradient(-from_center.x() / distance, -from_center.y() / distance, -1.0);
-      normal += weights[i] * gradient * gradient.transpose();
-      right -= weights[i] * (distance - circle.z()) * gradient;
+      normal += boundary.length[i] * gradient * gradient.transpose();
+      right -= boundary.length[i] * (distance - circle.z()) * gradient;
     }
     circle += normal.ldlt().solve(right);
   }
@@ -107,6 +147,7 @@ Result<ForgingBody> ForgingBody::make(const ForgingScene& scene, double end_sect
   body.add_bow(scene, seed);
   body.add_harmonics(scene, seed);
   body.add_press_marks(scene, seed);
+  body.add_faces(scene, seed);  // once the harmonics have been scaled to the circularity asked for
   body.put_ideal_axis_on_x(end_section_mm);
   constexpr int probes = 400;
   for (int i = 0; i <= probes; ++i) {
@@ -117,8 +158,9 @@ Result<ForgingBody> ForgingBody::make(const ForgingScene& scene, double end_sect
       if (s.h + s.h_phiphi < 0.05 * section.radius) {
         return invalid_input(
             "forging: the section at {:.0f} mm is not convex (radius {:.1f} mm); make circularity_mm ({}) or "
-            "press_mark_depth_mm ({}) smaller",
-            x, section.radius, scene.circularity_mm, scene.press_mark_depth_mm);
+            "press_mark_depth_mm ({}) smaller{}",
+            x, section.radius, scene.circularity_mm, scene.press_mark_depth_mm,
+            scene.faces > 0 ? ", or corner_radius_mm larger: marks and waves of its size do not fit on a corner" : "");
       }
     }
   }
@@ -178,6 +220,13 @@ void ForgingBody::add_press_marks(const ForgingScene& scene, std::uint64_t seed)
   }
 }
 
+void ForgingBody::add_faces(const ForgingScene& scene, std::uint64_t seed) {
+  faces_ = scene.faces;
+  corner_radius_ = scene.corner_radius_mm;
+  face_bulge_ = scene.face_bulge_mm;
+  first_face_rad_ = Random(stream_seed(seed, "faces")).angle_rad();
+}
+
 void ForgingBody::put_ideal_axis_on_x(double end_section_mm) {
   const int count = 1 + 2 * static_cast<int>(std::ceil(end_section_mm));  // every 0.5 mm or so
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
@@ -223,6 +272,8 @@ SectionShape ForgingBody::section(double x_mm) const {
     s.center_dx += step.center * slope;
   }
   add_curve(x_mm, s.center, s.center_dx);
+  if (faces_ > 0)
+    s.polygon = polygon_section(faces_, s.radius, s.radius_dx, corner_radius_, face_bulge_, first_face_rad_);
   for (int i = 0; i < SectionShape::harmonics; ++i) {
     const Harmonic& harmonic = harmonics_[i];
     const double k = 2.0 * pi / harmonic.wavelength, wave = k * x_mm + harmonic.phase;
@@ -249,7 +300,7 @@ double ForgingBody::largest_radius_mm() const {
     radius += step.radius;
     largest = std::max(largest, radius);
   }
-  return largest;
+  return faces_ > 0 ? largest / std::cos(pi / faces_) : largest;
 }
 
 }  // namespace imprint

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "lib/result/result.h"
+#include "simulation/polygon_section.h"
 #include "simulation/scene.h"
 
 namespace imprint {
@@ -22,7 +23,8 @@ struct SectionShape {
 
   Eigen::Vector2d center = Eigen::Vector2d::Zero();     ///< y, z
   Eigen::Vector2d center_dx = Eigen::Vector2d::Zero();  ///< its derivative along x
-  double radius = 0.0, radius_dx = 0.0;
+  double radius = 0.0, radius_dx = 0.0;                 ///< with faces: half of the width across them
+  PolygonSection polygon;                               ///< without faces: the section is round
   std::array<double, harmonics> cosine{}, sine{}, cosine_dx{}, sine_dx{};
   std::vector<Mark> marks;
 
@@ -39,6 +41,7 @@ struct SectionTruth {
   Eigen::Vector2d center_mm = Eigen::Vector2d::Zero();  ///< of the least-squares circle of the boundary
   double diameter_mm = 0.0;                             ///< mean width over all directions
   double circularity_mm = 0.0;                          ///< (largest - smallest width) / 2
+  std::vector<double> widths_mm;                        ///< across opposite faces, from the first face on
 };
 
 SectionTruth section_truth(const SectionShape& section);
@@ -72,12 +75,15 @@ class ForgingBody {
   void add_bow(const ForgingScene& scene, std::uint64_t seed);
   void add_harmonics(const ForgingScene& scene, std::uint64_t seed);
   void add_press_marks(const ForgingScene& scene, std::uint64_t seed);
+  void add_faces(const ForgingScene& scene, std::uint64_t seed);
   void put_ideal_axis_on_x(double end_section_mm);
   void add_curve(double x, Eigen::Vector2d& center, Eigen::Vector2d& center_dx) const;
 
   double length_mm_ = 0.0;
   double radius_ = 0.0;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
+  int faces_ = 0;
+  double first_face_rad_ = 0.0, corner_radius_ = 0.0, face_bulge_ = 0.0;
   std::vector<Step> steps_;
   Eigen::Vector2d bow_ = Eigen::Vector2d::Zero(), second_bow_ = Eigen::Vector2d::Zero(),
                   kink_ = Eigen::Vector2d::Zero();

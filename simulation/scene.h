@@ -35,7 +35,10 @@ struct ForgingScene {
   double kink_mm = 0.0;           ///< rise of a local bend, on top of the bow
   double circularity_mm = 5.0;    ///< (largest - smallest width) / 2 of the worst section, before press marks
   int press_marks = 12;           ///< shallow flats at random places
-  double press_mark_depth_mm = 2.0;                   ///< deepest
+  double press_mark_depth_mm = 2.0;  ///< deepest
+  int faces = 0;                     ///< 0: round; else the sections are regular polygons, diameters are across faces
+  double corner_radius_mm = 25.0;    ///< of sections with faces
+  double face_bulge_mm = 0.1;        ///< how far the middle of a face stands out from its edges
   Eigen::Vector3d center_world_mm{0.0, 0.0, 1000.0};  ///< where the middle of the ideal axis should be
   double yaw_deg = 0.0;                               ///< of the ideal axis, about world z
   double pitch_deg = 0.0;                             ///< of the ideal axis, first end up

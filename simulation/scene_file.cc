@@ -69,7 +69,8 @@ void read_stations(TomlReader& read, const toml::table& table, ForgingScene& for
 ForgingScene read_forging(TomlReader& read, const toml::table& table) {
   know_keys(read, table, "forging",
             {"present", "length_mm", "stations", "transition_mm", "eccentricity_mm", "bow_mm", "kink_mm",
-             "circularity_mm", "press_marks", "press_mark_depth_mm", "center_mm", "yaw_deg", "pitch_deg"});
+             "circularity_mm", "press_marks", "press_mark_depth_mm", "faces", "corner_radius_mm", "face_bulge_mm",
+             "center_mm", "yaw_deg", "pitch_deg"});
   ForgingScene f;
   f.present = read.boolean("forging.present", f.present);
   f.length_mm = within(read, "forging.length_mm", f.length_mm, 10.0, 50000.0);
@@ -81,6 +82,11 @@ ForgingScene read_forging(TomlReader& read, const toml::table& table) {
   f.circularity_mm = within(read, "forging.circularity_mm", f.circularity_mm, 0.0, 0.1 * f.length_mm);
   f.press_marks = whole(read, "forging.press_marks", f.press_marks, 0, 500);
   f.press_mark_depth_mm = within(read, "forging.press_mark_depth_mm", f.press_mark_depth_mm, 0.0, 0.05 * f.length_mm);
+  f.faces = whole(read, "forging.faces", f.faces, 0, 12);
+  if (f.faces % 2 != 0 || f.faces == 2)
+    read.fault("forging.faces", fmt::format("expected 0 (round), 4, 6, 8, 10 or 12, found {}", f.faces));
+  f.corner_radius_mm = within(read, "forging.corner_radius_mm", f.corner_radius_mm, 0.1, f.length_mm);
+  f.face_bulge_mm = within(read, "forging.face_bulge_mm", f.face_bulge_mm, 0.01, 0.01 * f.length_mm);
   f.center_world_mm = vector(read, "forging.center_mm", f.center_world_mm);
   f.yaw_deg = within(read, "forging.yaw_deg", f.yaw_deg, -30.0, 30.0);
   f.pitch_deg = within(read, "forging.pitch_deg", f.pitch_deg, -30.0, 30.0);
@@ -263,6 +269,11 @@ void check_sections(TomlReader& read, const Scene& scene) {
   if (scene.forging.circularity_mm > 0.2 * smallest) {
     read.fault("forging.circularity_mm", fmt::format("expected at most a fifth of the smallest diameter ({}), found {}",
                                                      smallest, scene.forging.circularity_mm));
+  }
+  if (scene.forging.faces > 0 && scene.forging.corner_radius_mm + scene.forging.face_bulge_mm > 0.4 * smallest) {
+    read.fault("forging.corner_radius_mm",
+               fmt::format("expected at most two fifths of the smallest width ({}), found {}", smallest,
+                           scene.forging.corner_radius_mm));
   }
   if (2.0 * scene.spec.end_section_mm > scene.forging.length_mm) {
     read.fault("rig.end_section_mm", fmt::format("expected at most half of length_mm ({}), found {}",

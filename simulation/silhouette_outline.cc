@@ -67,13 +67,19 @@ std::array<double, 2> contour_directions(const SectionShape& section, double x_m
   for (int side = 0; side < 2; ++side) {
     const double lift = std::acos(std::clamp(-(section.radius - along * section.radius_dx) / distance, -1.0, 1.0));
     double phi = away + (side == 0 ? -lift : lift);
-    for (int iteration = 0; iteration < 8; ++iteration) {
+    // F is positive away from the camera and negative towards it, with one root between on either side.
+    double positive = away, negative = away + (side == 0 ? -pi : pi);
+    for (int iteration = 0; iteration < 80; ++iteration) {
       const SectionShape::Support s = section.support(phi);
       const double f = q.x() * std::cos(phi) + q.y() * std::sin(phi) + s.h - along * s.h_x;
       const double slope = -q.x() * std::sin(phi) + q.y() * std::cos(phi) + s.h_phi - along * s.h_xphi;
+      (f > 0.0 ? positive : negative) = phi;
       const double step = f / slope;
       phi -= step;
       if (std::abs(step) < 1e-13) break;
+      // Where a face turns past the camera F's slope changes at once, and Newton's step can leave the bracket.
+      const auto [least, most] = std::minmax(positive, negative);
+      if (!(phi > least && phi < most)) phi = 0.5 * (least + most);
     }
     result[side] = phi;
   }

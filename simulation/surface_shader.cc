@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "simulation/random.h"
 #include "simulation/texture.h"
@@ -41,7 +42,7 @@ SurfaceShader::SurfaceShader(const Scene& scene, const Layout& layout)
   light_phi_ = random.uniform(0.6, 2.4);
   for (double x = 0.0; x <= length_mm_ + section_step_mm_; x += section_step_mm_) {
     const SectionShape section = layout.body.section(std::min(x, length_mm_));
-    sections_.push_back({section.radius, section.radius_dx, section.center});
+    sections_.push_back({section.radius, section.radius_dx, section.center, section.polygon});
   }
   // The threshold that leaves the asked share of the surface under scale.
   std::vector<double> samples(4000);
@@ -113,20 +114,30 @@ SurfaceHit meet_surface(const SurfaceShader& shader, double length_mm, const Eig
   const double dd = d.squaredNorm();
   double x = center.x() - direction.x() * center.tail<2>().dot(d) / dd;  // nearest to the axis
   Eigen::Vector2d from_axis = Eigen::Vector2d::UnitX();
+  std::optional<Eigen::Vector2d> of_face;  // normal of a section with faces
   double radius = 1.0, radius_dx = 0.0;
   for (int iteration = 0; iteration < 3; ++iteration) {
     const auto& section = shader.nominal(std::clamp(x, 0.0, length_mm));
     const Eigen::Vector2d o = center.tail<2>() - section.center;
+    radius_dx = section.radius_dx;
+    if (section.polygon.faces() > 0) {
+      const PolygonSection::Hit hit = section.polygon.meet(o, d);
+      x = center.x() + (hit.at - o).dot(d) / dd * direction.x();
+      from_axis = hit.at;
+      radius = from_axis.norm();
+      of_face = hit.normal;
+      continue;
+    }
     const double along = -o.dot(d) / dd;
     const double beside2 = (o + along * d).squaredNorm();
     const double k = along - std::sqrt(std::max(0.0, section.radius * section.radius - beside2) / dd);
     x = center.x() + k * direction.x();
     from_axis = o + k * d;
     radius = section.radius;
-    radius_dx = section.radius_dx;
   }
   const Eigen::Vector2d outward = from_axis.normalized();
-  const Eigen::Vector3d normal = Eigen::Vector3d(-radius_dx, outward.x(), outward.y()).normalized();
+  const Eigen::Vector2d across = of_face.value_or(outward);
+  const Eigen::Vector3d normal = Eigen::Vector3d(-radius_dx, across.x(), across.y()).normalized();
   const double facing = std::clamp(-normal.dot(direction) / direction.norm(), 0.0, 1.0);
   return {std::clamp(x, 0.0, length_mm), std::atan2(outward.y(), outward.x()), radius, facing};
 }

@@ -7,6 +7,7 @@
 
 #include "lib/geometry/points.h"
 #include "simulation/layout.h"
+#include "simulation/polygon_section.h"
 #include "simulation/scene.h"
 
 namespace imprint {
@@ -27,6 +28,7 @@ class SurfaceShader {
   struct NominalSection {
     double radius, radius_dx;
     Eigen::Vector2d center;
+    PolygonSection polygon;
   };
   [[nodiscard]] const NominalSection& nominal(double x_mm) const;
 

@@ -141,6 +141,7 @@ void add_sections(const Layout& layout, const std::vector<AxisPoint>& axis, orde
                         {"deflection_mm", deflection},
                         {"diameter_mm", point.truth.diameter_mm},
                         {"circularity_mm", point.truth.circularity_mm}});
+    if (!point.truth.widths_mm.empty()) sections.back()["widths_mm"] = point.truth.widths_mm;
   }
   json["max_deflection_mm"] = largest;
   json["sections"] = std::move(sections);

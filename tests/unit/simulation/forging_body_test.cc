@@ -17,6 +17,15 @@ ForgingScene stepped_scene() {
   return scene;
 }
 
+ForgingScene bar_scene(int faces) {
+  ForgingScene scene;
+  scene.stations = {{0.0, 300.0}};
+  scene.faces = faces;
+  scene.circularity_mm = 0.0;
+  scene.press_marks = 0;
+  return scene;
+}
+
 ForgingBody body_of(const ForgingScene& scene, std::uint64_t seed = 7) {
   auto body = ForgingBody::make(scene, end_section_mm, seed);
   REQUIRE(body);
@@ -53,6 +62,46 @@ TEST_CASE("forging body: the mean width of a section is its boundary's length ov
       length += (section.boundary((i + 1) * step) - section.boundary(i * step)).norm();
     }
     CHECK(section_truth(section).diameter_mm == Approx(length / std::numbers::pi).margin(1e-4));
+  }
+}
+
+TEST_CASE("forging body: a square of 300 mm is so wide across its faces, in whatever way it is turned") {
+  for (const int faces : {4, 8}) {
+    ForgingScene scene = bar_scene(faces);
+    const ForgingBody body = body_of(scene, 3);
+    constexpr double pi = std::numbers::pi;
+    for (const double x : {0.0, 700.0, 1900.0}) {
+      const SectionShape section = body.section(x);
+      const SectionTruth truth = section_truth(section);
+      REQUIRE(truth.widths_mm.size() == static_cast<std::size_t>(faces / 2));
+      for (const double width : truth.widths_mm) CHECK(width == Approx(300.0).margin(1e-6));
+      // Corner to corner: the sharp polygon's, less what two arcs of 25 mm cut off.
+      const double half = pi / faces, diagonal = (300.0 - 2.0 * 25.1) / std::cos(half) + 2.0 * 25.0;
+      CHECK(truth.circularity_mm == Approx(0.5 * (diagonal - 300.0)).margin(0.01));  // nearest of half degrees
+      // Faces, and arcs that make one turn together, all of it a bulge of 0.1 mm longer at most.
+      const double girth = faces * (300.0 - 2.0 * 25.1) * std::tan(half) + 2.0 * pi * 25.0;
+      CHECK(truth.diameter_mm == Approx(girth / pi).margin(0.05));
+      CHECK((truth.center_mm - section.center).norm() < 0.01);  // a regular polygon is its centre's mirror image
+    }
+  }
+}
+
+TEST_CASE("forging body: the support function of a section with faces has its derivatives, steps and bow included") {
+  ForgingScene scene = bar_scene(4);
+  scene.stations = {{0.0, 300.0}, {900.0, 260.0}};
+  scene.face_bulge_mm = 2.0;  // soft enough for differences
+  scene.circularity_mm = 1.0;
+  const ForgingBody body = body_of(scene);
+  constexpr double d = 1e-6;
+  for (const double x : {100.0, 890.0, 905.0}) {
+    const SectionShape here = body.section(x), before = body.section(x - d), after = body.section(x + d);
+    for (double phi = 0.1; phi < 6.2; phi += 0.05) {
+      const auto s = here.support(phi), ahead = here.support(phi + d), behind = here.support(phi - d);
+      CHECK(s.h_phi == Approx((ahead.h - behind.h) / (2 * d)).margin(1e-4));
+      CHECK(s.h_phiphi == Approx((ahead.h_phi - behind.h_phi) / (2 * d)).margin(1e-3));
+      CHECK(s.h_x == Approx((after.support(phi).h - before.support(phi).h) / (2 * d)).margin(1e-5));
+      CHECK(s.h_xphi == Approx((after.support(phi).h_phi - before.support(phi).h_phi) / (2 * d)).margin(1e-3));
+    }
   }
 }
 

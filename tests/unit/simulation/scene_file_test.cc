@@ -99,6 +99,9 @@ TEST_CASE("scene file: faults of every kind name their place") {
   CHECK_THAT(fault_after("distance_mm = 7400.0", ""), Catch::Contains("camera[0].distance_mm: missing"));
   CHECK_THAT(fault_after("rotations_deg = [0.0, 60.0, 120.0]", "rotations_deg = []"),
              Catch::Contains("observations.rotations_deg"));
+  CHECK_THAT(fault_after("bow_mm = 8.0", "faces = 5"), Catch::Contains("forging.faces"));
+  CHECK_THAT(fault_after("bow_mm = 8.0", "faces = 4\ncorner_radius_mm = 90.0"),
+             Catch::Contains("forging.corner_radius_mm"));
   CHECK_THAT(fault_after("end_section_mm = 80.0", "end_section_mm = 1200.0"), Catch::Contains("rig.end_section_mm"));
   CHECK_THAT(fault_after("[backdrop]", "[backdrop"), Catch::Contains("not valid TOML"));
   CHECK_THAT(fault_after("[backdrop]", "[hall]"), Catch::Contains("hall: unknown key"));

@@ -66,6 +66,40 @@ TEST_CASE("outline: the ray of a rim point touches the solid and does not enter 
   }
 }
 
+TEST_CASE("outline: the rims of a bar with faces are the outermost of all its boundary") {
+  Scene scene = forge_scene();
+  scene.forging.stations = {{0.0, 300.0}};
+  scene.forging.circularity_mm = 0.0;
+  scene.forging.press_marks = 0;
+  for (const int faces : {4, 8}) {
+    scene.forging.faces = faces;
+    const auto layout = lay_out(scene);
+    REQUIRE(layout);
+    for (std::size_t c = 0; c < scene.cameras.size(); ++c) {
+      for (const BodyPose& body_pose : layout->body_poses) {
+        const Eigen::Vector3d center = body_pose.body_from_world(layout->poses[c].center_world_mm);
+        for (const double x : {0.0, 430.0, 1300.0}) {
+          const SectionShape section = layout->body.section(x);
+          const auto phi = contour_directions(section, x, center);
+          // Without steps a rim is where the angle about the camera, in the section's own plane, is extreme.
+          const Eigen::Vector2d eye = center.tail<2>() + (x - center.x()) * section.center_dx;
+          const Eigen::Vector2d middle = section.center - eye;
+          const auto seen_at = [&](double direction) {
+            const Eigen::Vector2d p = section.boundary(direction) - eye;
+            return std::atan2(middle.x() * p.y() - middle.y() * p.x(), middle.dot(p));
+          };
+          double least = 1e9, most = -1e9;
+          for (double direction = 0.0; direction < 2.0 * std::numbers::pi; direction += 1e-3)
+            least = std::min(least, seen_at(direction)), most = std::max(most, seen_at(direction));
+          // A thousandth of a turn along an arc of 25 mm leaves 1e-5 mm of 7 m.
+          CHECK(std::min(seen_at(phi[0]), seen_at(phi[1])) == Approx(least).margin(1e-8));
+          CHECK(std::max(seen_at(phi[0]), seen_at(phi[1])) == Approx(most).margin(1e-8));
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("outline: no point of the solid is seen outside it, and every end's rim reaches it") {
   const Scene scene = forge_scene();
   const auto layout = lay_out(scene);
