@@ -19,7 +19,7 @@ struct FilterConfig {
   double min_step_px = 0.7;          // smaller steps are smoothed over; ours
   double min_kink = 0.12;            // change of a rim's slope that ends a stretch, px per station; ours
   int agreement_window = 240;        // over which the middle of the rims is smooth; ours
-  int min_trusted_run = 12;          // stations; shorter trusted stretches of a rim are not trusted; ours
+  int min_trusted_run = 18;          // stations; shorter trusted stretches of a rim are not trusted; ours
   double min_disagreement_px = 0.5;  // of the middle, from which the rim further in is not trusted; ours
 
   double min_coverage = 0.04;  // share of the length with both rims trusted; ours

@@ -56,15 +56,16 @@ class BodyWalk {
   int last_column(int from, int step, double max_gap_px, std::vector<float>& brightness) {
     const int n = static_cast<int>(levels_.body.size());
     start(from);
-    const int gap = std::max(3, static_cast<int>(kGap * width_px_));
+    const int gap = std::max(3, static_cast<int>(kGap * width_px_ / rarity_));
     double sum = 0, most = 0;
     int last = from, air = 0;
-    for (int x = from; x >= 0 && x < n && most - sum <= kAir * max_gap_px + kIsland * width_px_; x += step) {
+    for (int x = from; x >= 0 && x < n && most - sum <= rarity_ * (kAir * max_gap_px + kIsland * width_px_);
+         x += step) {
       const double w = worth(x);
       brightness[static_cast<std::size_t>(x)] = brightness_;
       sum += w;
-      air = w <= -kAir ? air + 1 : 0;
-      if (air == gap) sum -= kIsland * width_px_;
+      air = w <= -kAir * rarity_ ? air + 1 : 0;
+      if (air == gap) sum -= rarity_ * kIsland * width_px_;
       if (sum > most) most = sum, last = x;
     }
     return last;
@@ -88,11 +89,26 @@ class BodyWalk {
     unsure_ = 0;
     brightness_ = std::max(least_body_, quantile(values_, 0.5));
     ground_ = levels_.ground[static_cast<std::size_t>(from)];
+    rarity_ = rarity_of_scale(from);
+  }
+
+  // On a clean body a dark column is no scale: what darkness costs, as the logarithm of its share about column `from`.
+  double rarity_of_scale(int from) {
+    constexpr double kAbout = 3.0;    // of the width, to both sides
+    constexpr double kScaled = 0.15;  // the share of a scaled body, which the costs were set for
+    constexpr double kCleanest = 0.002, kMost = 3.5;
+    const int reach = static_cast<int>(kAbout * width_px_), n = static_cast<int>(levels_.body.size());
+    double dark = 0, all = 1;
+    for (int x = std::max(0, from - reach); x <= std::min(n - 1, from + reach); ++x) {
+      gather_inside(working_, line_, width_px_, x, values_);
+      for (const float v : values_) dark += v < brightness_ - kDarker * (brightness_ - ground_), all += 1;
+    }
+    return std::clamp(std::log(std::max(kCleanest, dark / all)) / std::log(kScaled), 1.0, kMost);
   }
 
   double worth(int x) {
     gather_inside(working_, line_, width_px_, x, values_);
-    if (values_.empty()) return -kAir;
+    if (values_.empty()) return -kAir * rarity_;
     const float ground = std::min(levels_.ground[static_cast<std::size_t>(x)], ground_);
     const float contrast = brightness_ - ground;
     const float darker = kDarker + kLost * std::min(1.0F, static_cast<float>(2.0 * unsure_ / width_px_));
@@ -104,13 +120,13 @@ class BodyWalk {
     }
     const auto count = static_cast<double>(values_.size());
     ++unsure_;
-    if (same < kNothing * count) return -kAir;
+    if (same < kNothing * count) return -kAir * rarity_;
     if (same > kSurely * count && near > 0) {
       unsure_ = std::max(0, unsure_ - 4);
       brightness_ += kMemory * (static_cast<float>(sum / near) - brightness_);
       ground_ += kGroundMemory * (levels_.ground[static_cast<std::size_t>(x)] - ground_);
     }
-    return (same - kScale * dark - kTooBright * bright) / count;
+    return (same - rarity_ * kScale * dark - kTooBright * bright) / count;
   }
 
   const WorkingImage& working_;
@@ -119,7 +135,8 @@ class BodyWalk {
   const BodyLevels& levels_;
   float least_body_;
   float brightness_ = 0, ground_ = 0;
-  int unsure_ = 0;  // columns that were not surely the body's, less a few for each that was
+  double rarity_ = 1;  // of scale on the body, 1: it is scaled
+  int unsure_ = 0;     // columns that were not surely the body's, less a few for each that was
   std::vector<float> values_;
 };
 

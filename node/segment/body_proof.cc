@@ -32,7 +32,7 @@ BodyProof prove_body(BodyPath& path, const WorkingImage& working, const BodyLeve
     ++columns;
     pair.both = false;
     proof.columns.push_back(0.0F);
-    if (contrast <= 0) continue;
+    if (contrast <= 0 || !(pair.weight > 0)) continue;
     const double band = std::max(2.0, 0.08 * static_cast<double>(pair.width_px()));
     int ends = 0;
     double credit = 0;

@@ -13,7 +13,7 @@ constexpr float kEdge = 0.06F;     // worth of an edge, of the width
 constexpr float kColumn = 0.3F;    // most that one column decides, of the width
 constexpr float kPerPx = 0.1F;     // of moving the rim by a pixel, of the width
 constexpr float kIgnored = 0.25F;  // of a jump: as many columns as this, of the width
-constexpr float kLopsided = 0.5F;  // of leaving the distance that suits both rims, in pixels
+constexpr float kLopsided = 2.0F;  // of leaving the distance that suits both rims, in pixels
 
 using Ratings = std::vector<std::vector<float>>;
 
@@ -112,7 +112,9 @@ BodyPath trace_rims(const WorkingImage& working, const AxisLine& line, const Bod
     RimPair pair;
     pair.upper_px = axis_y - rim[0][i], pair.lower_px = axis_y + rim[1][i];
     pair.body = levels.body[static_cast<std::size_t>(x)];
-    pair.weight = 1.0F;
+    // At the least distance nothing spoke for any other: no rim was found.
+    const bool found = pair.width_px() > 2.0F * static_cast<float>(least + 1);
+    pair.weight = found ? 1.0F : 0.0F;
     path.columns.push_back({x, pair});
   }
   return path;

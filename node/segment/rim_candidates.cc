@@ -9,17 +9,19 @@
 namespace imprint {
 namespace {
 
-// Standard deviation of the gradient where nothing is: most of any image is plain, so the median tells it.
+// Standard deviation of the gradient where nothing is: even a crowded hall is plain in a fifth of the image, so the
+// quantile of the smallest fifth tells it.
 double gradient_noise(const cv::Mat_<float>& gy, const cv::Mat_<unsigned char>& inside, double quantum) {
   std::vector<float> sample;
   for (int y = 1; y < gy.rows; y += 3)
     for (int x = (y % 2); x < gy.cols; x += 3)
       if (inside(y, x)) sample.push_back(std::abs(gy(y, x)));
   if (sample.empty()) return quantum;
-  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
-  std::nth_element(sample.begin(), middle, sample.end());
+  constexpr double kFifthOfNormal = 0.2533;  // quantile of the magnitude, in standard deviations
+  const auto fifth = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 5);
+  std::nth_element(sample.begin(), fifth, sample.end());
   // Without noise the grey steps remain: a quarter of one is what rounding leaves in a smoothed gradient.
-  return std::max(1.4826 * *middle, 0.25 * quantum);
+  return std::max(*fifth / kFifthOfNormal, 0.25 * quantum);
 }
 
 // Weak pixels that hang together with a strong run along the axis.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include <catch2/catch.hpp>
 #include <opencv2/imgproc.hpp>
@@ -214,6 +215,47 @@ TEST_CASE("segment: clutter that outshines and touches the body does not bend it
   REQUIRE(found);
   CHECK(worst_rim_error(*found, body) < 8);  // some px are left to the search about the rim
   CHECK(std::abs(length_px(*found) - 600) < 24);
+}
+
+TEST_CASE("segment: a rim under scale keeps the distance of the clean rim across") {
+  drawn::Body body = plain_body();
+  body.patches = {{-150, 50, false, 30, 30}, {120, 220, true, 25, 25}};
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 24), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 10);  // the search about the rim reaches farther
+}
+
+TEST_CASE("segment: a clean body ends before a plate or a grille as bright as itself") {
+  for (const bool grille : {false, true}) {
+    const drawn::Body body = plain_body();
+    cv::Mat_<float> image = drawn::draw(body, kSize);
+    if (grille)
+      for (int y = 210; y < 400; y += 24) drawn::draw_bar(image, {752, y, 148, 12}, 150);
+    else
+      drawn::draw_bar(image, {768, 240, 100, 140}, 150);
+    const auto found = segment_forging(drawn::expose(image, 3, 25), prior(), {});
+    INFO((grille ? "grille" : "plate"));
+    REQUIRE(found);
+    const double last = found->origin.x_px + found->direction_x * (found->first_station_px + length_px(*found) - 1);
+    CHECK(last == Approx(750).margin(30));
+  }
+}
+
+TEST_CASE("segment: a hall full of edges does not hide a faint body") {
+  drawn::Body body = plain_body();
+  body.background = 40, body.level = 60;
+  cv::Mat_<float> hall(kSize, 40.0F);
+  std::mt19937 random(26);
+  const auto draw = [&](int least, int most) { return std::uniform_int_distribution(least, most)(random); };
+  for (int i = 0; i < 900; ++i)
+    drawn::draw_bar(hall, {draw(-20, 880), draw(-20, 580), draw(8, 60), draw(4, 30)}, static_cast<float>(draw(25, 55)));
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x)
+      if (image(y, x) < 41) image(y, x) = hall(y, x);
+  const auto found = segment_forging(drawn::expose(image, 0.8, 27), prior(), {});
+  REQUIRE(found);
+  CHECK(worst_rim_error(*found, body) < 6);
 }
 
 TEST_CASE("segment: out of view on one side") {
