@@ -20,15 +20,9 @@ struct CertsOptions {
   std::string serial;
 };
 
-nlohmann::json to_json(const IssuedCertificate& certificate) {
-  nlohmann::json document = {{"name", certificate.name},
-                             {"common_name", certificate.common_name},
-                             {"serial", certificate.serial},
-                             {"role", role_name(certificate.role)},
-                             {"site", certificate.site},
-                             {"line", certificate.line},
-                             {"not_after", utc_text(certificate.not_after_ns)},
-                             {"revoked", nullptr}};
+nlohmann::json listed(const IssuedCertificate& certificate) {
+  nlohmann::json document = to_json(certificate);
+  document["revoked"] = nullptr;
   if (certificate.revoked_ns != 0) document["revoked"] = utc_text(certificate.revoked_ns);
   return document;
 }
@@ -54,7 +48,7 @@ int run_issue(CertsOptions options, bool as_json) {
   if (!issued) return fail(issued.error());
   const std::string folder = authority->folder_of(issued->name).string();
   if (as_json) {
-    nlohmann::json document = to_json(*issued);
+    nlohmann::json document = listed(*issued);
     document["folder"] = folder;
     return print_json(document);
   }
@@ -80,7 +74,7 @@ int run_list(const CertsOptions& options, bool as_json) {
   if (!authority) return fail(authority.error());
   nlohmann::json certificates = nlohmann::json::array();
   for (const IssuedCertificate& certificate : authority->list().certificates) {
-    certificates.push_back(to_json(certificate));
+    certificates.push_back(listed(certificate));
     if (as_json) continue;
     std::cout << fmt::format("{:<20} {:<9} {}/{} {} until {}{}\n", certificate.name, role_name(certificate.role),
                              certificate.site, certificate.line, certificate.serial, utc_text(certificate.not_after_ns),

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "lib/access/schema_list.h"
 #include "lib/clock/wall_clock.h"
 #include "lib/config/atomic_file.h"
 #include "lib/wire/keys.h"
@@ -22,19 +23,7 @@ constexpr auto kRoles = std::to_array<std::pair<Role, std::string_view>>({{Role:
                                                                           {Role::operator_, "operator"},
                                                                           {Role::engineer, "engineer"}});
 
-json to_json(const IssuedCertificate& certificate) {
-  return {{"name", certificate.name},
-          {"common_name", certificate.common_name},
-          {"serial", certificate.serial},
-          {"role", role_name(certificate.role)},
-          {"site", certificate.site},
-          {"line", certificate.line},
-          {"not_after", utc_text(certificate.not_after_ns)},
-          {"not_after_ns", certificate.not_after_ns},
-          {"revoked_ns", certificate.revoked_ns}};
-}
-
-// Throws what nlohmann throws; read_access_list() is the boundary.
+// Throws what nlohmann throws; read_schema_list() is the boundary.
 Result<IssuedCertificate> certificate_from(const json& entry) {
   const auto role = role_from_name(entry.at("role").get<std::string>());
   if (!role) return pass_on(role.error());
@@ -50,27 +39,44 @@ Result<IssuedCertificate> certificate_from(const json& entry) {
 
 AccessRule camera_rule(const IssuedCertificate& certificate, const Keys& keys) {
   const std::string& id = certificate.name;
-  return {.name = certificate.common_name,
-          .send = {keys.imprint(id), keys.health(id), keys.alive(id), keys.delivery(id), keys.service(id)},
-          .receive = {keys.trigger(), keys.receipt(id), keys.fusion_alive()},
-          .ask = {}};
+  return {
+      .name = certificate.common_name,
+      .send = {keys.imprint(id), keys.health(id), keys.alive(id), keys.delivery(id), keys.rest(id), keys.service(id)},
+      .receive = {keys.trigger(), keys.receipt(id), keys.fusion_alive()},
+      .ask = {}};
 }
 
 AccessRule person_rule(const IssuedCertificate& certificate, const Keys& keys) {
-  AccessRule rule{.name = certificate.common_name,
-                  .send = {},
-                  .receive = {keys.everything()},
-                  .ask = {keys.fusion_service("status"), keys.fusion_service("result"), keys.fusion_service("log"),
-                          keys.service(Keys::kAny, "config"), keys.service(Keys::kAny, "log"),
-                          keys.service(Keys::kAny, "crop"), keys.service(Keys::kAny, "bundle")}};
+  AccessRule rule{
+      .name = certificate.common_name,
+      .send = {},
+      .receive = {keys.everything()},
+      .ask = {keys.fusion_service("status"), keys.fusion_service("result"), keys.fusion_service("log"),
+              keys.service(Keys::kAny, "config"), keys.service(Keys::kAny, "log"), keys.service(Keys::kAny, "crop"),
+              keys.service(Keys::kAny, "firmware"), keys.service(Keys::kAny, "bundle")}};
   if (certificate.role == Role::viewer) return rule;
   rule.send.push_back(keys.trigger());
   rule.ask.push_back(keys.fusion_service("acknowledge"));
-  if (certificate.role == Role::engineer) rule.ask.push_back(keys.service(Keys::kAny, "configure"));
+  if (certificate.role == Role::engineer) {
+    rule.ask.push_back(keys.service(Keys::kAny, "configure"));
+    rule.ask.push_back(keys.service(Keys::kAny, "update"));
+  }
   return rule;
 }
 
 }  // namespace
+
+json to_json(const IssuedCertificate& certificate) {
+  return {{"name", certificate.name},
+          {"common_name", certificate.common_name},
+          {"serial", certificate.serial},
+          {"role", role_name(certificate.role)},
+          {"site", certificate.site},
+          {"line", certificate.line},
+          {"not_after", utc_text(certificate.not_after_ns)},
+          {"not_after_ns", certificate.not_after_ns},
+          {"revoked_ns", certificate.revoked_ns}};
+}
 
 std::string_view role_name(Role role) {
   return std::ranges::find(kRoles, role, &std::pair<Role, std::string_view>::first)->second;
@@ -88,23 +94,19 @@ const IssuedCertificate* AccessList::find_common_name(std::string_view common_na
 }
 
 Result<AccessList> read_access_list(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return pass_on(text.error());
-  try {
-    const json document = json::parse(*text);
-    if (document.at("schema") != kSchema)
-      return invalid_input("{}: schema: expected \"{}\", found {}", path.string(), kSchema,
-                           document.at("schema").dump());
-    AccessList list{.plant = document.at("plant"), .certificates = {}};
-    for (const json& entry : document.at("certificates")) {
-      auto certificate = certificate_from(entry);
-      if (!certificate) return invalid_input("{}: {}", path.string(), certificate.error().message);
-      list.certificates.push_back(std::move(*certificate));
-    }
-    return list;
-  } catch (const json::exception& error) {
-    return invalid_input("{}: expected an access list as `imprint certs` writes it: {}", path.string(), error.what());
-  }
+  AccessList list;
+  const auto read = read_schema_list(path, kSchema, "an access list as `imprint certs` writes it",
+                                     [&](const json& document) -> Result<void> {
+                                       list.plant = document.at("plant").get<std::string>();
+                                       for (const json& entry : document.at("certificates")) {
+                                         auto certificate = certificate_from(entry);
+                                         if (!certificate) return pass_on(certificate.error());
+                                         list.certificates.push_back(std::move(*certificate));
+                                       }
+                                       return {};
+                                     });
+  if (!read) return pass_on(read.error());
+  return list;
 }
 
 Result<void> write_access_list(const std::filesystem::path& path, const AccessList& list) {

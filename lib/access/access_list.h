@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "lib/result/result.h"
 #include "lib/transport/transport.h"
 
@@ -31,6 +33,9 @@ struct IssuedCertificate {
   std::int64_t not_after_ns = 0;  ///< since the Unix epoch
   std::int64_t revoked_ns = 0;    ///< 0: it is not
 };
+
+/// As it stands in `access.json`.
+nlohmann::json to_json(const IssuedCertificate& certificate);
 
 /// All certificates of a plant, and so who may do what: `access.json`. Holds no secret; a router obeys the copy it has.
 struct AccessList {

@@ -7,6 +7,7 @@
 #include <openssl/crypto.h>
 #include <nlohmann/json.hpp>
 
+#include "lib/access/schema_list.h"
 #include "lib/config/atomic_file.h"
 #include "lib/wire/keys.h"
 
@@ -18,7 +19,7 @@ using nlohmann::json;
 constexpr const char* kSchema = "imprint.users/1";
 constexpr const char* kYescrypt = "$y$";
 
-// Throws what nlohmann throws; read_user_list() is the boundary.
+// Throws what nlohmann throws; read_schema_list() is the boundary.
 Result<User> user_from(const json& entry) {
   User user{.name = entry.at("name"), .role = Role::viewer, .hash = entry.at("hash")};
   if (auto valid = check_id("user", user.name); !valid) return pass_on(valid.error());
@@ -37,23 +38,18 @@ const User* UserList::find(std::string_view name) const {
 }
 
 Result<UserList> read_user_list(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return pass_on(text.error());
-  try {
-    const json document = json::parse(*text);
-    if (document.at("schema") != kSchema)
-      return invalid_input("{}: schema: expected \"{}\", found {}", path.string(), kSchema,
-                           document.at("schema").dump());
-    UserList list;
-    for (const json& entry : document.at("users")) {
-      auto user = user_from(entry);
-      if (!user) return invalid_input("{}: {}", path.string(), user.error().message);
-      list.users.push_back(std::move(*user));
-    }
-    return list;
-  } catch (const json::exception& error) {
-    return invalid_input("{}: expected users as `imprint users` writes them: {}", path.string(), error.what());
-  }
+  UserList list;
+  const auto read = read_schema_list(path, kSchema, "users as `imprint users` writes them",
+                                     [&](const json& document) -> Result<void> {
+                                       for (const json& entry : document.at("users")) {
+                                         auto user = user_from(entry);
+                                         if (!user) return pass_on(user.error());
+                                         list.users.push_back(std::move(*user));
+                                       }
+                                       return {};
+                                     });
+  if (!read) return pass_on(read.error());
+  return list;
 }
 
 Result<void> write_user_list(const std::filesystem::path& path, const UserList& list) {

@@ -105,18 +105,23 @@ TEST_CASE("access: a camera sends under its own name alone and reads nobody's im
   REQUIRE(rule.ask.empty());
 }
 
-TEST_CASE("access: viewers send nothing, operators trigger, engineers configure") {
+TEST_CASE("access: viewers send nothing, operators trigger, engineers configure and update boards") {
   const Plant plant;
   Authority authority = plant.authority();
   const std::string trigger = "imprint/plant/L1/v1/trigger";
   const std::string configure = "imprint/plant/L1/v1/cam/*/service/configure";
+  const std::string update = "imprint/plant/L1/v1/cam/*/service/update";
   const AccessRule viewer = rule_of(authority, *authority.issue(request_of("v", Role::viewer)));
   REQUIRE(viewer.send.empty());
+  REQUIRE(holds(viewer.ask, "imprint/plant/L1/v1/cam/*/service/firmware"));
   REQUIRE_FALSE(holds(viewer.ask, configure));
   const AccessRule operating = rule_of(authority, *authority.issue(request_of("o", Role::operator_)));
   REQUIRE(operating.send == std::vector{trigger});
   REQUIRE_FALSE(holds(operating.ask, configure));
-  REQUIRE(holds(rule_of(authority, *authority.issue(request_of("e", Role::engineer))).ask, configure));
+  REQUIRE_FALSE(holds(operating.ask, update));
+  const AccessRule engineer = rule_of(authority, *authority.issue(request_of("e", Role::engineer)));
+  REQUIRE(holds(engineer.ask, configure));
+  REQUIRE(holds(engineer.ask, update));
 }
 
 TEST_CASE("access: a list that is damaged or of another kind is an error that names the file") {
