@@ -1,8 +1,32 @@
 #include "fusion/combine/bordered_system.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace imprint {
+namespace {
+
+/// Inverse of L of `pivot` = L L^T (lower half used, lost); false when `pivot` is not positive definite. Of a size
+/// known beforehand, column by column, this takes a third of the time of the general decomposition.
+template <int kSize>
+bool invert_factor(Eigen::Matrix<double, kSize, kSize>& pivot, Eigen::Matrix<double, kSize, kSize>& inverse) {
+  using Rows = Eigen::Matrix<double, kSize, kSize, Eigen::RowMajor>;
+  Rows rows = Rows::Identity();
+  for (int j = 0; j < kSize; ++j) {
+    if (!(pivot(j, j) > 0.0)) return false;
+    const double scale = 1.0 / std::sqrt(pivot(j, j));
+    const Eigen::Matrix<double, kSize, 1> column = scale * pivot.col(j);
+    rows.row(j) *= scale;
+    for (int i = j + 1; i < kSize; ++i) {
+      pivot.col(i) -= column(i) * column;
+      rows.row(i) -= column(i) * rows.row(j);
+    }
+  }
+  inverse = rows;
+  return true;
+}
+
+}  // namespace
 
 template <int kUnknowns>
 BorderedChain<kUnknowns>::BorderedChain(int nodes, int border_count)
@@ -51,57 +75,62 @@ bool BorderedChain<kUnknowns>::factor() {
   for (std::size_t k = 0; k < diagonal.size(); ++k) {
     Matrix pivot = diagonal[k];
     if (k > 0) pivot.noalias() -= coupled_[k - 1].transpose() * coupled_[k - 1];
-    const Eigen::LLT<Matrix> llt(pivot);
-    if (llt.info() != Eigen::Success) return false;
-    inverse_[k] = llt.matrixL().solve(Matrix::Identity());
+    if (!invert_factor<kUnknowns>(pivot, inverse_[k])) return false;
     if (k + 1 < diagonal.size()) coupled_[k].noalias() = inverse_[k] * upper[k];
   }
   return true;
 }
 
 template <int kUnknowns>
-bool BorderedChain<kUnknowns>::keep_solution(Eigen::MatrixXd& state) {
-  backward(state);
-  if (!state.allFinite()) return false;
-  node_solution.resize(diagonal.size());
-  for (int i = 0; i < nodes(); ++i)
-    node_solution[static_cast<std::size_t>(i)] = state.middleCols<kUnknowns>(i * kUnknowns).transpose();
-  return true;
+void BorderedChain<kUnknowns>::forward(std::vector<Vector>& state) const {
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    Vector value = state[k];
+    if (k > 0) value.noalias() -= coupled_[k - 1].transpose() * state[k - 1];
+    state[k].noalias() = inverse_[k] * value;
+  }
 }
 
 template <int kUnknowns>
-Eigen::MatrixXd BorderedChain<kUnknowns>::right_row() const {
-  Eigen::MatrixXd row(1, nodes() * kUnknowns);
-  for (int i = 0; i < nodes(); ++i)
-    row.middleCols<kUnknowns>(i * kUnknowns) = right[static_cast<std::size_t>(i)].transpose();
-  return row;
+bool BorderedChain<kUnknowns>::backward(std::vector<Vector>& state) const {
+  bool finite = true;
+  for (std::size_t k = state.size(); k-- > 0;) {
+    Vector value = state[k];
+    if (k + 1 < state.size()) value.noalias() -= coupled_[k] * state[k + 1];
+    state[k].noalias() = inverse_[k].transpose() * value;
+    finite = finite && state[k].allFinite();
+  }
+  return finite;
 }
 
 template <int kUnknowns>
 bool BorderedChain<kUnknowns>::solve_nodes(const Eigen::VectorXd& border_held) {
   if (!factor()) return false;
-  Eigen::MatrixXd state = right_row();
-  state.noalias() -= border_held.transpose() * border;
-  forward(state);
+  node_solution = right;
+  forward(node_solution);
   border_solution = border_held;
-  return keep_solution(state);
+  return backward(node_solution);
 }
 
 template <int kUnknowns>
 bool BorderedChain<kUnknowns>::solve() {
   if (border_size() == 0) return solve_nodes(border_right);
   if (!factor()) return false;
-  Eigen::MatrixXd state = right_row();
-  forward(state);
+  node_solution = right;
+  forward(node_solution);
   halfway_ = border;
   forward(halfway_);
   Eigen::MatrixXd schur = corner;
   schur.selfadjointView<Eigen::Lower>().rankUpdate(halfway_, -1.0);
   schur_.compute(schur);
   if (schur_.info() != Eigen::Success) return false;
-  border_solution = schur_.solve(border_right - halfway_ * state.row(0).transpose());
-  state.row(0).noalias() -= border_solution.transpose() * halfway_;
-  return keep_solution(state);
+  Eigen::VectorXd rest = border_right;
+  for (int i = 0; i < nodes(); ++i)
+    rest.noalias() -= halfway_.middleCols<kUnknowns>(i * kUnknowns) * node_solution[static_cast<std::size_t>(i)];
+  border_solution = schur_.solve(rest);
+  for (int i = 0; i < nodes(); ++i)
+    node_solution[static_cast<std::size_t>(i)].noalias() -=
+        halfway_.middleCols<kUnknowns>(i * kUnknowns).transpose() * border_solution;
+  return backward(node_solution);
 }
 
 template <int kUnknowns>

@@ -29,8 +29,9 @@ class BorderedChain {
 
   /// Factors and solves; false when the matrix is not positive definite.
   [[nodiscard]] bool solve();
-  /// The same with the border's unknowns held at `border_held`, which takes a fraction of the time. Of what comes
-  /// after, only the solution and `node_covariances` are then there.
+  /// The nodes alone, which takes a fraction of the time: for `right` without what the border's unknowns make of it
+  /// when held at `border_held`; border and corner have no say. Of what comes after, only the solution and
+  /// `node_covariances` are then there.
   [[nodiscard]] bool solve_nodes(const Eigen::VectorXd& border_held);
   // After solve().
   std::vector<Vector> node_solution;
@@ -53,11 +54,12 @@ class BorderedChain {
 
  private:
   [[nodiscard]] bool factor();
-  [[nodiscard]] Eigen::MatrixXd right_row() const;
-  [[nodiscard]] bool keep_solution(Eigen::MatrixXd& state);
   // One a row, as `border` stands.
   void forward(Eigen::MatrixXd& rows) const;
   void backward(Eigen::MatrixXd& rows) const;
+  // One alone, node by node.
+  void forward(std::vector<Vector>& state) const;
+  [[nodiscard]] bool backward(std::vector<Vector>& state) const;
 
   std::vector<Matrix> inverse_;  // of L of each pivot block
   std::vector<Matrix> coupled_;  // L^-1 (i, i + 1)

@@ -119,7 +119,7 @@ Result<CombinedForging> combine(std::span<const ObservedForging> observations, s
     section.circularity_sigma_mm *= config.interval_widening;
   }
   widen_draws(combined, config.interval_widening, 0.5 * common);
-  if (auto believable = within_rig(forging, combined); !believable) return pass_on(believable.error());
+  if (auto believable = within_rig(observations, forging, combined); !believable) return pass_on(believable.error());
   warn_of_unseen(combined);
   warn_of_lengths(observations, config, combined);
   return combined;

@@ -17,6 +17,7 @@ constexpr double kLeastOutOfRound = 7e-3;       // of the radius: what a forging
 constexpr std::size_t kEnoughObservations = 4;  // that the noise can be told from the sections' shapes
 constexpr double kMedianOfSquare = 0.4549;      // of a squared normal value
 constexpr double kFreedom = 4.0;                // of Student's t for the tangents
+constexpr double kMostFollowed = 0.8;           // of the noise by the fit, beyond which the rest says too little
 constexpr double kStartShare = 0.05;            // sigma of the start's radius, of the radius
 constexpr double kPlaceShare = 0.02;            // variance of a station's place along x, in squared steps between nodes
 
@@ -59,7 +60,7 @@ class JointSolver {
   std::optional<JointEstimate> run() {
     for (int iteration = 0; iteration < config_.iterations; ++iteration)
       if (!improve(iteration)) return std::nullopt;
-    together_ = std::max(kTogether, moved_together(tangents_.rows, noise_scale_));
+    together_ = std::max(kTogether, moved_together(tangents_, noise_scale_));
     std::vector<std::optional<TangentEquation>> equations;
     if (!solve(Use::interval, equations)) return std::nullopt;
     JointEstimate estimate;
@@ -128,23 +129,26 @@ class JointSolver {
       if (equations.back()) equations.back()->extra_variance_mm2 = shoulder_variance_mm2(*equations.back());
     }
     if (!(noise_scale_ > 0.0)) noise_scale_ = std::max(kLeastNoise, first_scatter(equations));
-    for (const std::size_t r : by_node(equations)) add_equation(tangents_.rows[r], *equations[r]);
-    if (!(use == Use::held ? system_.solve_nodes(places_.held()) : system_.solve())) return false;
+    const bool held = use == Use::held;
+    for (std::size_t r = 0; r < equations.size(); ++r)
+      if (equations[r]) add_equation(tangents_.rows[r], *equations[r], held);
+    if (!(held ? system_.solve_nodes(places_.held()) : system_.solve())) return false;
     system_.node_covariances(own_, with_next_);
     return true;
   }
 
   bool improve(int round) {
-    // Places settle at once and are the costly part: every other round leaves them where they are.
+    // Places settle at once and are the costly part: most rounds leave them where they are.
+    constexpr int kPlacesEvery = 4;
     const bool last = round + 1 == config_.iterations;
     std::vector<std::optional<TangentEquation>> equations;
-    if (!solve(round % 2 == 1 && !last ? Use::held : Use::estimate, equations)) return false;
+    if (!solve(round % kPlacesEvery != 0 ? Use::held : Use::estimate, equations)) return false;
     nodes_ = system_.node_solution;
     find_residuals(equations);
     places_.take(system_.border_solution);
     // The last round leaves amounts and solution belonging to each other.
     if (last) return true;
-    if (round > 0) together_ = std::max(kTogether, moved_together(tangents_.rows, noise_scale_));
+    if (round > 0) together_ = std::max(kTogether, moved_together(tangents_, noise_scale_));
     weigh(equations);
     prior_.learn(nodes_, own_, with_next_, static_cast<int>(places_.placements().size()), out_of_round_mm_);
     return true;
@@ -156,25 +160,16 @@ class JointSolver {
       off.push_back(e ? std::optional(e->value_mm - e->coefficients.dot((1.0 - e->share) * start_[e->node] +
                                                                         e->share * start_[e->node + 1]))
                       : std::nullopt);
-    return rim_scatter(tangents_.rows, off);
+    return rim_scatter(tangents_, off);
   }
 
-  /// The equations there are, node by node: what they are added to is then still in the processor's cache.
-  std::vector<std::size_t> by_node(std::span<const std::optional<TangentEquation>> equations) const {
-    std::vector<std::size_t> place(nodes_.size() + 1, 0);
-    for (const auto& equation : equations)
-      if (equation) ++place[equation->node + 1];
-    for (std::size_t i = 1; i < place.size(); ++i) place[i] += place[i - 1];
-    std::vector<std::size_t> order(place.back());
-    for (std::size_t r = 0; r < equations.size(); ++r)
-      if (equations[r]) order[place[equations[r]->node]++] = r;
-    return order;
-  }
-
-  void add_equation(const TangentRow& row, const TangentEquation& equation) {
+  void add_equation(const TangentRow& row, const TangentEquation& equation, bool held) {
     const double w =
         row.trust / (row.variance_mm2 * noise_scale_ * noise_scale_ * together_ + equation.extra_variance_mm2);
-    places_.add(system_, equation.coefficients, equation, row.viewer, w);
+    if (held)
+      places_.add_held(system_, equation.coefficients, equation, row.viewer, w);
+    else
+      places_.add(system_, equation.coefficients, equation, row.viewer, w);
   }
 
   void find_residuals(std::span<const std::optional<TangentEquation>> equations) {
@@ -209,25 +204,31 @@ class JointSolver {
 
   /// Whom to trust in the next round.
   void weigh(std::span<const std::optional<TangentEquation>> equations) {
-    std::vector<double> squares;  // of the deviations, the fit's own freedom included, in the stated variances
+    std::vector<double> squares;  // of the deviations, in the stated variances
+    double followed = 0.0;        // of the noise, by the fit: what its freedom takes from those squares
     for (std::size_t r = 0; r < tangents_.rows.size(); ++r) {
       TangentRow& row = tangents_.rows[r];
       if (!row.used) continue;
       const TangentEquation& e = *equations[r];
       const NodeVector& g = e.coefficients;
       const double here = 1.0 - e.share;
-      const double fitted = here * here * g.dot(own_[e.node] * g) + e.share * e.share * g.dot(own_[e.node + 1] * g) +
-                            2.0 * here * e.share * g.dot(with_next_[e.node] * g);
+      // Lazily: a product of this size is not worth the preparations for a large one.
+      const auto spread = [&g](const NodeMatrix& covariance) { return g.dot(covariance.lazyProduct(g)); };
+      const double fitted = here * here * spread(own_[e.node]) + e.share * e.share * spread(own_[e.node + 1]) +
+                            2.0 * here * e.share * spread(with_next_[e.node]);
       const double expected = row.residual_mm * row.residual_mm + fitted;
-      squares.push_back(expected / row.variance_mm2);
-      const double variance = row.variance_mm2 * noise_scale_ * noise_scale_ + e.extra_variance_mm2;
+      squares.push_back(row.residual_mm * row.residual_mm / row.variance_mm2);
+      const double noise = row.variance_mm2 * noise_scale_ * noise_scale_;
+      const double variance = noise + e.extra_variance_mm2;
+      followed += std::min(fitted / noise, 1.0);
       row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance) * belongs(row, e);
     }
     // Of few observations the sections' shapes can follow any noise: then what the rims scatter at first has to do.
     if (places_.placements().size() >= kEnoughObservations && !squares.empty()) {
       const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
       std::nth_element(squares.begin(), middle, squares.end());
-      noise_scale_ = std::clamp(std::sqrt(*middle / kMedianOfSquare), kLeastNoise, noise_scale_);
+      const double left = 1.0 - std::min(followed / static_cast<double>(squares.size()), kMostFollowed);
+      noise_scale_ = std::clamp(std::sqrt(*middle / kMedianOfSquare / left), kLeastNoise, noise_scale_);
     }
   }
 

@@ -151,7 +151,17 @@ double mm_per_px(std::span<const ObservedForging> observations) {
   return *middle;
 }
 
-Result<void> within_rig(const ForgingSpec& forging, CombinedForging& combined) {
+Result<void> within_rig(std::span<const ObservedForging> observations, const ForgingSpec& forging,
+                        CombinedForging& combined) {
+  constexpr double kStretched = 1.5;  // of every observation's own length: no end was misjudged by as much
+  double longest = 0;
+  for (const ObservedForging& observed : observations)
+    longest = std::max(longest, (observed.end_world_mm - observed.start_world_mm).norm());
+  if (!(combined.length_mm <= kStretched * longest))
+    return job_failed(
+        "all observations together make the forging {:.0f} mm long, none of them alone more than {:.0f} mm: nothing of "
+        "this can be believed; is the kind of section right (forging.section of rig.toml)?",
+        combined.length_mm, longest);
   const auto beyond = std::count_if(combined.sections.begin(), combined.sections.end(), [&](const auto& section) {
     return section.diameter_mm < 0.9 * forging.diameter_min_mm || section.diameter_mm > 1.1 * forging.diameter_max_mm;
   });

@@ -42,8 +42,10 @@ Result<EndPlanes> final_ends(std::span<const ObservedForging> observations, std:
 /// How large a pixel is at the forging, across the line of sight: median over all tangents.
 double mm_per_px(std::span<const ObservedForging> observations);
 
-/// Warns of sections outside the rig's diameters; fails (job_failed) when they are the greater part.
-Result<void> within_rig(const ForgingSpec& forging, CombinedForging& combined);
+/// Warns of sections outside the rig's diameters; fails (job_failed) when they are the greater part, or when the
+/// forging came out far longer than any observation saw it.
+Result<void> within_rig(std::span<const ObservedForging> observations, const ForgingSpec& forging,
+                        CombinedForging& combined);
 
 /// Warns of observations whose own length differs from that of all together.
 void warn_of_lengths(std::span<const ObservedForging> observations, const CombineConfig& config,

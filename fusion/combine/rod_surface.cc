@@ -56,7 +56,8 @@ double RodSurface::deepest(double x_mm, double distance_mm, double steepness,
     if (std::abs(slope) < steepness)
       along =
           std::clamp(slope * distance_mm / (steepness * std::sqrt(steepness * steepness - slope * slope)), low, high);
-    const double depth = here + slope * (along - low) - std::hypot(distance_mm, steepness * along);
+    const double depth =
+        here + slope * (along - low) - std::sqrt(distance_mm * distance_mm + steepness * steepness * along * along);
     if (depth > best_depth) {
       best_depth = depth;
       best = along;

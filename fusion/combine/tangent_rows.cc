@@ -9,6 +9,7 @@ namespace imprint {
 
 TangentRows tangent_rows(std::span<const ObservedForging> observations) {
   TangentRows all;
+  std::size_t rims = 0;
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const ObservedForging& observed = observations[k];
     for (std::size_t c = 0; c < observed.cameras.size(); ++c) {
@@ -21,22 +22,23 @@ TangentRows tangent_rows(std::span<const ObservedForging> observations) {
       if (!viewer.pose_covariance.allFinite()) viewer.pose_covariance.setZero();
       viewer.pose_covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(observed.disagreement_sigma_mm, 2);
       for (const bool upper : {true, false}) {
-        const std::size_t first = all.rows.size();
         for (const ObservedSection& section : observed.sections)
           for (const TangentPlane& tangent : section.tangents)
             if (tangent.camera == static_cast<int>(c) && tangent.upper == upper && tangent.weight > 0.0)
               all.rows.push_back({.viewer = all.viewers.size(),
+                                  .rim = rims,
                                   .ray_world = tangent.ray_world,
                                   .variance_mm2 = tangent.sigma_mm * tangent.sigma_mm / tangent.weight,
                                   .x_mm = tangent.s_mm,
                                   .trust = tangent.stray ? 0.0 : 1.0});
-        std::sort(all.rows.begin() + static_cast<std::ptrdiff_t>(first), all.rows.end(),
-                  [](const TangentRow& a, const TangentRow& b) { return a.x_mm < b.x_mm; });
-        for (std::size_t i = first + 1; i < all.rows.size(); ++i) all.rows[i].continues = true;
+        ++rims;
       }
       all.viewers.push_back(viewer);
     }
   }
+  std::sort(all.rows.begin(), all.rows.end(), [](const TangentRow& a, const TangentRow& b) { return a.x_mm < b.x_mm; });
+  all.rims.resize(rims);
+  for (std::size_t r = 0; r < all.rows.size(); ++r) all.rims[all.rows[r].rim].push_back(r);
   return all;
 }
 
@@ -72,17 +74,17 @@ std::optional<TangentEquation> equation_of(TangentRow& row, const ViewerPlaces& 
   return equation;
 }
 
-double rim_scatter(std::span<const TangentRow> rows, std::span<const std::optional<double>> off_mm) {
+double rim_scatter(const TangentRows& tangents, std::span<const std::optional<double>> off_mm) {
   constexpr std::size_t kApart = 8;  // stations: some 25 px
   std::vector<double> bends;
-  for (std::size_t r = 0; r + 2 * kApart < rows.size(); ++r) {
-    bool same_rim = true;
-    for (std::size_t k = r + 1; k <= r + 2 * kApart && same_rim; ++k) same_rim = rows[k].continues;
-    const TangentRow &a = rows[r], &b = rows[r + kApart], &c = rows[r + 2 * kApart];
-    if (!same_rim || !(a.trust > 0.0 && b.trust > 0.0 && c.trust > 0.0)) continue;
-    const auto &first = off_mm[r], &middle = off_mm[r + kApart], &last = off_mm[r + 2 * kApart];
-    if (!first || !middle || !last) continue;
-    bends.push_back(std::abs(*first - 2.0 * *middle + *last) / std::sqrt(b.variance_mm2));
+  for (const std::vector<std::size_t>& rim : tangents.rims) {
+    for (std::size_t i = 0; i + 2 * kApart < rim.size(); ++i) {
+      const std::size_t a = rim[i], b = rim[i + kApart], c = rim[i + 2 * kApart];
+      const TangentRow& row = tangents.rows[b];
+      if (!(tangents.rows[a].trust > 0.0 && row.trust > 0.0 && tangents.rows[c].trust > 0.0)) continue;
+      if (!off_mm[a] || !off_mm[b] || !off_mm[c]) continue;
+      bends.push_back(std::abs(*off_mm[a] - 2.0 * *off_mm[b] + *off_mm[c]) / std::sqrt(row.variance_mm2));
+    }
   }
   if (bends.empty()) return 1.0;
   const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
@@ -90,27 +92,32 @@ double rim_scatter(std::span<const TangentRow> rows, std::span<const std::option
   return 1.4826 * *middle / std::sqrt(6.0);
 }
 
-double moved_together(std::span<const TangentRow> rows, double noise_scale) {
+double moved_together(const TangentRows& tangents, double noise_scale) {
   constexpr std::size_t kFurthest = 120;  // stations
   constexpr double kNone = 0.05, kMost = 2.5;
   double squares = 0.0, count = 0.0;
   // What belongs to something else is no measure of what moves the rims.
-  const auto size_of = [&](const TangentRow& row) {
-    return std::clamp(row.residual_mm * std::sqrt(row.trust / row.variance_mm2) / noise_scale, -kMost, kMost);
-  };
-  for (const TangentRow& row : rows) {
-    if (!row.used) continue;
-    squares += size_of(row) * size_of(row), count += 1.0;
+  std::vector<std::vector<std::optional<double>>> sizes;
+  for (const std::vector<std::size_t>& rim : tangents.rims) {
+    std::vector<std::optional<double>>& along = sizes.emplace_back();
+    for (const std::size_t r : rim) {
+      const TangentRow& row = tangents.rows[r];
+      along.emplace_back();
+      if (!row.used) continue;
+      const double size = row.residual_mm * std::sqrt(row.trust / row.variance_mm2) / noise_scale;
+      along.back() = std::clamp(size, -kMost, kMost);
+      squares += *along.back() * *along.back(), count += 1.0;
+    }
   }
   if (!(squares > 0.0)) return 1.0;
   double sum = 1.0;
   for (std::size_t lag = 1; lag < kFurthest; lag += 1 + lag / 8) {
     double products = 0.0, pairs = 0.0;
-    std::size_t run = 0;  // rows of the same rim up to this one
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      run = rows[r].continues ? run + 1 : 0;
-      if (run < lag || !rows[r].used || !rows[r - lag].used) continue;
-      products += size_of(rows[r]) * size_of(rows[r - lag]), pairs += 1.0;
+    for (const auto& along : sizes) {
+      for (std::size_t i = lag; i < along.size(); ++i) {
+        if (!along[i] || !along[i - lag]) continue;
+        products += *along[i] * *along[i - lag], pairs += 1.0;
+      }
     }
     const double likeness = pairs > 0.0 ? products / pairs / (squares / count) : 0.0;
     if (likeness < kNone) break;

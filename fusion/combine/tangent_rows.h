@@ -12,12 +12,12 @@
 
 namespace imprint {
 
-/// One tangent, ordered along its rim, and what the estimate so far makes of it.
+/// One tangent, and what the estimate so far makes of it.
 struct TangentRow {
   std::size_t viewer = 0;  ///< index into TangentRows::viewers
+  std::size_t rim = 0;     ///< index into TangentRows::rims
   Eigen::Vector3d ray_world = Eigen::Vector3d::UnitZ();
   double variance_mm2 = 1.0;  ///< stated, weight included
-  bool continues = false;     ///< the same rim as the row before, one station on
   double x_mm = 0.0;
   double residual_mm = 0.0;
   double from_circle_mm = 0.0;  ///< from the section without its out-of-round
@@ -28,9 +28,11 @@ struct TangentRow {
 struct TangentRows {
   std::vector<Viewer> viewers;
   std::vector<TangentRow> rows;
+  std::vector<std::vector<std::size_t>> rims;  ///< rows of each rim, along it
 };
 
-/// All tangents of all observations that carry weight, rim by rim and along each rim by x. Cameras left out have none.
+/// All tangents of all observations that carry weight, along the forging, so that what belongs to the same sections
+/// lies together in memory. Cameras left out have none.
 TangentRows tangent_rows(std::span<const ObservedForging> observations);
 
 /// A tangent of a round forging: coefficients . node + effects of the places = value.
@@ -52,11 +54,11 @@ void set_place_effects(PlacedEquation& equation, const Eigen::Vector3d& center_m
 /// Scatter of the tangents along their rims, in their stated sigmas: from second differences wide enough to see what
 /// haze and filtering move together. `off_mm`: of each row from what the estimate starts with, where it has a say; the
 /// estimate itself could bend to the tangents until none scatter.
-double rim_scatter(std::span<const TangentRow> rows, std::span<const std::optional<double>> off_mm);
+double rim_scatter(const TangentRows& tangents, std::span<const std::optional<double>> off_mm);
 
 /// How many neighbouring tangents of a rim count as one: the sum of their residuals' likeness over all distances, out
 /// to where none is left. Counted so, a rim that hot air bends over tens of px says no more than it knows.
 /// `noise_scale`: of the stated sigmas.
-double moved_together(std::span<const TangentRow> rows, double noise_scale);
+double moved_together(const TangentRows& tangents, double noise_scale);
 
 }  // namespace imprint

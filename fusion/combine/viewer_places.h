@@ -64,19 +64,20 @@ class ViewerPlaces {
   /// Of each observation along x, 0 for the first.
   [[nodiscard]] std::vector<double> shift_sigma_mm(const Eigen::MatrixXd& border_covariance) const;
 
+  /// Adds an equation of weight `w`, with `g` the coefficients of its nodes, for these alone: the places are held where
+  /// they were found.
+  template <int kUnknowns>
+  void add_held(BorderedChain<kUnknowns>& system, const typename BorderedChain<kUnknowns>::Vector& g,
+                const PlacedEquation& equation, std::size_t viewer, double w) const {
+    add_to_nodes(system, g, equation, equation.value_mm - made_by_cameras(equation, viewer), w);
+  }
   /// Adds an equation of weight `w`, with `g` the coefficients of its nodes.
   template <int kUnknowns>
   void add(BorderedChain<kUnknowns>& system, const typename BorderedChain<kUnknowns>::Vector& g,
            const PlacedEquation& equation, std::size_t viewer, double w) const {
+    add_to_nodes(system, g, equation, equation.value_mm, w);
     const std::size_t i = equation.node;
     const double next = equation.share, here = 1.0 - next;
-    const typename BorderedChain<kUnknowns>::Matrix square = w * g * g.transpose();
-    system.diagonal[i] += here * here * square;
-    system.diagonal[i + 1] += next * next * square;
-    system.upper[i] += here * next * square;
-    system.right[i] += w * here * equation.value_mm * g;
-    system.right[i + 1] += w * next * equation.value_mm * g;
-
     const int camera = camera_column(viewer);
     const Eigen::Vector2d at_camera(equation.camera * (1.0 - equation.along), equation.camera * equation.along);
     const bool moved = viewers_[viewer].observation > 0;
@@ -101,6 +102,28 @@ class ViewerPlaces {
   }
 
  private:
+  template <int kUnknowns>
+  static void add_to_nodes(BorderedChain<kUnknowns>& system, const typename BorderedChain<kUnknowns>::Vector& g,
+                           const PlacedEquation& equation, double value_mm, double w) {
+    const std::size_t i = equation.node;
+    const double next = equation.share, here = 1.0 - next;
+    const typename BorderedChain<kUnknowns>::Vector by_here = w * here * g, by_next = w * next * g;
+    for (int j = 0; j < kUnknowns; ++j) {
+      if (g(j) == 0.0) continue;
+      const double to_here = here * g(j), to_next = next * g(j);
+      system.diagonal[i].col(j) += to_here * by_here;
+      system.upper[i].col(j) += to_next * by_here;
+      system.diagonal[i + 1].col(j) += to_next * by_next;
+    }
+    system.right[i] += value_mm * by_here;
+    system.right[i + 1] += value_mm * by_next;
+  }
+  /// Share of an equation's value that the camera's place makes as it was found last.
+  [[nodiscard]] double made_by_cameras(const PlacedEquation& equation, std::size_t viewer) const {
+    const int camera = camera_column(viewer);
+    return equation.camera * ((1.0 - equation.along) * cameras_(camera) + equation.along * cameras_(camera + 1));
+  }
+
   static constexpr int kCameraUnknowns = 2;
   static constexpr int kPlaceUnknowns = 6;
   static int camera_column(std::size_t viewer) { return static_cast<int>(viewer) * kCameraUnknowns; }

@@ -213,7 +213,7 @@ Result<CombinedForging> combine_faceted(std::span<const ObservedForging> observa
   }
   const double common = 2.0 * config.common_edge_sigma_px * mm_per_px(observations);
   fill_sections(*estimate, *ends, found.kind, forging.end_section_mm, config, common, combined);
-  if (auto believable = within_rig(forging, combined); !believable) return pass_on(believable.error());
+  if (auto believable = within_rig(observations, forging, combined); !believable) return pass_on(believable.error());
   warn_of_lengths(observations, config, combined);
   return combined;
 }

@@ -211,7 +211,7 @@ class FacetedSolver {
       const Vector node = (1.0 - e->share) * nodes_[e->node] + e->share * nodes_[e->node + 1];
       off.emplace_back(e->value_mm - e->coefficients().dot(node));
     }
-    return std::max(kLeastNoise, rim_scatter(tangents_.rows, off));
+    return std::max(kLeastNoise, rim_scatter(tangents_, off));
   }
 
   bool improve(int round) {
@@ -243,7 +243,7 @@ class FacetedSolver {
     // Of few observations the sections can follow any noise: then what the rims scatter at first has to do.
     if (places_.placements().size() >= kEnoughObservations)
       noise_scale_ = std::max(kLeastNoise, std::sqrt(*middle / kMedianOfSquare));
-    together_ = std::max(kTogether, moved_together(tangents_.rows, noise_scale_));
+    together_ = std::max(kTogether, moved_together(tangents_, noise_scale_));
     learn();
     return true;
   }

@@ -14,6 +14,21 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
+/// How many times as wide as in `first` the forging is in `later`, in the median of the stations that show both rims in
+/// both: where scale hides now the thin, now the thick part, the widths themselves would differ. 1 where too few do.
+double width_ratio(const Imprint& first, const Imprint& later) {
+  std::vector<double> ratios;
+  const std::size_t n = std::min({first.upper.offset_px.size(), first.lower.offset_px.size(),
+                                  later.upper.offset_px.size(), later.lower.offset_px.size()});
+  const auto width = [](const Imprint& imprint, std::size_t i) {
+    const bool seen = imprint.upper.weight[i] > 0.0 && imprint.lower.weight[i] > 0.0;
+    return seen ? std::abs(imprint.lower.offset_px[i] - imprint.upper.offset_px[i]) : 0.0;
+  };
+  for (std::size_t i = 0; i < n; ++i)
+    if (width(first, i) > 0.0 && width(later, i) > 0.0) ratios.push_back(width(later, i) / width(first, i));
+  return ratios.size() < n / 4 || ratios.empty() ? 1.0 : median(ratios);
+}
+
 int corners_of(SectionKind kind) {
   if (kind == SectionKind::square || kind == SectionKind::rectangle) return 4;
   return kind == SectionKind::octagon ? 8 : 12;
@@ -22,24 +37,20 @@ int corners_of(SectionKind kind) {
 }  // namespace
 
 double change_of_width(std::span<const std::vector<Imprint>> observations) {
-  std::map<std::string, std::pair<double, double>> widths;  // least and largest, by camera
-  for (const std::vector<Imprint>& imprints : observations) {
-    for (const Imprint& imprint : imprints) {
-      if (!imprint.failure.empty()) continue;
-      std::vector<double> across;
-      const std::size_t n = std::min(imprint.upper.offset_px.size(), imprint.lower.offset_px.size());
-      for (std::size_t i = 0; i < n; ++i)
-        if (imprint.upper.weight[i] > 0.0 && imprint.lower.weight[i] > 0.0)
-          across.push_back(std::abs(imprint.lower.offset_px[i] - imprint.upper.offset_px[i]));
-      if (across.size() < n / 4 || across.empty()) continue;
-      const double width = median(across);
-      auto [at, added] = widths.try_emplace(imprint.camera_id, width, width);
-      at->second = {std::min(at->second.first, width), std::max(at->second.second, width)};
-    }
-  }
+  std::map<std::string, std::vector<const Imprint*>> by_camera;
+  for (const std::vector<Imprint>& imprints : observations)
+    for (const Imprint& imprint : imprints)
+      if (imprint.failure.empty()) by_camera[imprint.camera_id].push_back(&imprint);
   // One camera may have followed something else in one observation: the second largest change counts.
   std::vector<double> changes;
-  for (const auto& [camera, range] : widths) changes.push_back(range.second / range.first - 1.0);
+  for (const auto& [camera, seen] : by_camera) {
+    double least = 1.0, largest = 1.0;
+    for (const Imprint* later : seen) {
+      const double ratio = width_ratio(*seen.front(), *later);
+      least = std::min(least, ratio), largest = std::max(largest, ratio);
+    }
+    changes.push_back(largest / least - 1.0);
+  }
   if (changes.size() < 2) return 0.0;
   std::sort(changes.rbegin(), changes.rend());
   return changes[1];
@@ -93,6 +104,7 @@ FoundSection find_section(std::span<const SupportSample> samples, SectionKind to
   constexpr double kThanRound = 0.5, kThanFewer = 0.25;  // share of the scatter that more corners may leave at most
   constexpr double kAlike = 0.02;                        // widths of a square
   constexpr double kLeast = 5e-4;                        // scatter, of the size, that tells nothing more
+  constexpr double kRoundest = 0.7;                      // corner radius, of the size, beyond which no face is left
   FoundSection found;
   if (told == SectionKind::round || samples.size() < 100) return found;
   if (told != SectionKind::unknown) {
@@ -104,7 +116,7 @@ FoundSection find_section(std::span<const SupportSample> samples, SectionKind to
   for (const SectionKind kind : {SectionKind::rectangle, SectionKind::octagon, SectionKind::convex}) {
     CornerFit fit = fit_corners(samples, corners_of(kind));
     const double allowed = found.kind == SectionKind::round ? kThanRound : kThanFewer;
-    if (!(std::max(kLeast, fit.scatter) < allowed * least)) continue;
+    if (!(std::max(kLeast, fit.scatter) < allowed * least) || fit.section.radius_mm > kRoundest) continue;
     least = std::max(kLeast, fit.scatter);
     found.kind = kind;
     found.fit = std::move(fit);

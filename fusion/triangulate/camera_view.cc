@@ -52,6 +52,15 @@ std::size_t usable(const std::vector<CurveRay>& rays) {
       std::count_if(rays.begin(), rays.end(), [](const CurveRay& r) { return r.weight > 0.0; }));
 }
 
+std::size_t longest_blind_run(const CameraView& view) {
+  std::size_t longest = 0, run = 0;
+  for (std::size_t i = 0; i < view.upper.size(); ++i) {
+    run = view.upper[i].weight > 0.0 || view.lower[i].weight > 0.0 ? 0 : run + 1;
+    longest = std::max(longest, run);
+  }
+  return longest;
+}
+
 }  // namespace
 
 tl::expected<CameraView, std::string> view_of(const Imprint& imprint, int camera, double min_rim_share) {
@@ -86,6 +95,7 @@ tl::expected<CameraView, std::string> view_of(const Imprint& imprint, int camera
   if (upper < needed || lower < needed)
     return Reason(fmt::format("only {} and {} of {} points of its rims can be trusted, {} of each needed", upper, lower,
                               kImprintStations, needed));
+  view.blind_share = static_cast<double>(longest_blind_run(view)) / kImprintStations;
   return view;
 }
 

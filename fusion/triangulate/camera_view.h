@@ -29,7 +29,8 @@ struct CameraView {
   CameraPose pose;
   double focal_length_px = 0.0;
   std::vector<CurveRay> upper, lower, axis;
-  EndRay start, end;  ///< at the smaller and the larger station
+  EndRay start, end;         ///< at the smaller and the larger station
+  double blind_share = 0.0;  ///< longest run of stations without either rim, of all
 };
 
 /// The rays of an imprint. When it cannot be used: why, for the operator.

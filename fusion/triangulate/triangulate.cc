@@ -75,7 +75,8 @@ Result<void> TriangulateConfig::validate() const {
     return invalid_input("triangulate.edge_sigma_px: more than 0 expected, found {}", edge_sigma_px);
   if (!(min_view_angle_deg > 0.0 && min_view_angle_deg < 90.0))
     return invalid_input("triangulate.min_view_angle_deg: between 0 and 90 expected, found {}", min_view_angle_deg);
-  if (!(max_ray_distance_share > 0.0) || !(max_disagreement_share > 0.0) || !(min_rim_share > 0.0))
+  if (!(max_ray_distance_share > 0.0) || !(max_disagreement_share > 0.0) || !(min_rim_share > 0.0) ||
+      !(warn_blind_share >= 0.0))
     return invalid_input("triangulate: shares above 0 expected");
   return {};
 }
@@ -117,6 +118,11 @@ Result<ObservedForging> triangulate(std::span<const Imprint> imprints, const For
                     agreeing->disagreement_mm));
   }
 
+  for (const CameraView& view : agreeing->views)
+    if (view.blind_share > config.warn_blind_share)
+      observed.warnings.push_back(fmt::format(
+          "camera {} sees neither rim over {:.0f} % of its view in one piece; the intervals there are wider",
+          ids[static_cast<std::size_t>(view.camera)], 100.0 * view.blind_share));
   RodConsensus rod = std::move(agreeing->rod);
   RodEnds ends = find_ends(agreeing->views, rod, ids, forging.end_section_mm, config.out_of_round_share);
   for (int iteration = 0; iteration < 2; ++iteration) {

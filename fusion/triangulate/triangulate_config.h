@@ -11,6 +11,7 @@ struct TriangulateConfig {
   double min_view_angle_deg =
       15.0;                     ///< widest angle between two cameras, seen from the axis, below which we refuse (ours)
   double min_rim_share = 0.05;  ///< share of a camera's rim points that must be usable (ours)
+  double warn_blind_share = 0.3;         ///< of a view without rims in one piece, above which the result says so (ours)
   double max_ray_distance_share = 0.25;  ///< of the largest diameter: limit of [D] equation 2 on the distance of rays
   double max_disagreement_share = 0.04;  ///< of the diameter: a camera this far from the others contradicts them (ours)
 

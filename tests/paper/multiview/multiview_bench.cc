@@ -1,4 +1,4 @@
-// [D] tables 2 to 4 and figure 17, and what the joint estimate is meant to reach: forgings of exactly known shape seen
+// [D] tables 1 to 4 and figure 17, and what the joint estimate is meant to reach: forgings of exactly known shape seen
 // by the forge's three cameras, twelve observations at 30 degrees, their rims exact (the floor) or as a forge corrupts
 // them, against the truth. The thesis's estimators measure the same views.
 #include <chrono>
@@ -12,9 +12,10 @@
 #include <CLI/CLI.hpp>
 
 #include "fusion/combine/combine_config.h"
-#include "fusion/thesis/thesis_geometry.h"
-#include "fusion/triangulate/triangulate_config.h"
 #include "tests/paper/multiview/corruption.h"
+#include "tests/paper/multiview/coverage.h"
+#include "tests/paper/multiview/laser_table.h"
+#include "tests/paper/multiview/measuring.h"
 
 namespace {
 
@@ -24,73 +25,11 @@ using namespace imprint::test;
 struct Options {
   int forgings = 6;
   int specimens = 3;
+  int intervals = 0;
+  bool laser_only = false;
   unsigned seed = 1;
-  double out_of_round_mm = 5.0;
-  double wave_mm = 200.0;
+  OutOfRound out_of_round;
 };
-
-/// Errors against the truth of one way of measuring, over all forgings.
-struct Errors {
-  double axis = 0.0, diameter = 0.0, diameter90 = 0.0, circularity = 0.0, length = 0.0;
-  double axis_covered = 0.0, diameter_covered = 0.0, circularity_covered = 0.0;
-  int count = 0;
-
-  void add(const Deviation& d) {
-    axis += d.axis_rms * d.axis_rms;
-    diameter += d.diameter_rms * d.diameter_rms;
-    diameter90 += d.diameter_best90_rms * d.diameter_best90_rms;
-    circularity += std::abs(d.circularity_mean) + d.circularity_sigma;
-    length += d.length * d.length;
-    axis_covered += d.axis_covered;
-    diameter_covered += d.diameter_covered;
-    circularity_covered += d.circularity_covered;
-    ++count;
-  }
-  [[nodiscard]] Errors mean() const {
-    Errors m = *this;
-    for (double* square : {&m.axis, &m.diameter, &m.diameter90, &m.length}) *square = std::sqrt(*square / count);
-    for (double* sum : {&m.circularity, &m.axis_covered, &m.diameter_covered, &m.circularity_covered}) *sum /= count;
-    return m;
-  }
-};
-
-/// Every observation of a session reconstructed once, by either estimator.
-struct Reconstructed {
-  std::vector<ObservedForging> observed;
-  std::vector<SpaceCurves> curves;
-};
-
-Result<Reconstructed> reconstruct(const Session& session) {
-  Reconstructed result;
-  for (const std::vector<Imprint>& imprints : session.imprints) {
-    auto observed = triangulate(imprints, session.spec, TriangulateConfig{});
-    if (!observed) return pass_on(observed.error());
-    std::vector<CameraView> views;
-    for (std::size_t i = 0; i < imprints.size(); ++i)
-      if (auto view = view_of(imprints[i], static_cast<int>(i), TriangulateConfig{}.min_rim_share))
-        views.push_back(std::move(*view));
-    auto curves = space_curves(views, session.spec, ThesisConfig{});
-    if (!curves) return pass_on(curves.error());
-    result.observed.push_back(std::move(*observed));
-    result.curves.push_back(std::move(*curves));
-  }
-  return result;
-}
-
-enum class Estimator { joint, thesis };
-
-Result<Deviation> measure(const Rod& rod, const Session& session, const Reconstructed& all, std::size_t observations,
-                          Estimator estimator) {
-  const auto rotations = std::span(session.rotations_deg).first(observations);
-  auto combined =
-      estimator == Estimator::joint
-          ? combine(std::span(all.observed).first(observations), rotations, session.spec, CombineConfig{})
-          : thesis_geometry(std::span(all.curves).first(observations), rotations, session.spec, ThesisConfig{});
-  if (!combined) return pass_on(combined.error());
-  combined->draws.clear();  // nothing here asks for them
-  combined->shape.clear();
-  return deviation(make_measurement(*combined, {}, "bench", "exact"), rod, session);
-}
 
 constexpr std::size_t kObservations = 12;
 constexpr std::size_t kMost = 11;
@@ -125,12 +64,6 @@ Result<void> add_forging(const Rod& rod, const Session& session, Columns& column
     column.two_cameras.add(*d);
   }
   return {};
-}
-
-Rod forging(const Options& options, unsigned seed) {
-  Rod rod = stepped_rod();
-  make_out_of_round(rod, options.out_of_round_mm, options.wave_mm, seed);
-  return rod;
 }
 
 // [D] tables 2 and 3: axis, diameter, circularity (mean + sigma); the last two with 10 % left out.
@@ -235,7 +168,7 @@ Result<void> time_of(const Session& session) {
   if (!all) return pass_on(all.error());
   const auto processor_ms = [] { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
   double best = 1e9;
-  for (int run = 0; run < 5; ++run) {
+  for (int run = 0; run < 20; ++run) {
     const double begin = processor_ms();
     const auto combined = combine(all->observed, session.rotations_deg, session.spec, CombineConfig{});
     if (!combined) return pass_on(combined.error());
@@ -247,15 +180,18 @@ Result<void> time_of(const Session& session) {
 }
 
 Result<void> run(const Options& options) {
+  if (options.intervals > 0) return print_coverage(options.intervals, options.seed, options.out_of_round);
+  if (options.laser_only) return print_laser_table(options.forgings, options.seed, options.out_of_round);
   Columns floor, seen;
   std::optional<Session> last;
   if (options.forgings == 0) {
     std::mt19937 generator(options.seed);
-    return time_of(corrupted(observe(forging(options, options.seed), {.observations = kObservations}), {}, generator));
+    return time_of(corrupted(observe(forging(options.out_of_round, options.seed), {.observations = kObservations}), {},
+                             generator));
   }
   for (int i = 0; i < options.forgings; ++i) {
     const unsigned seed = options.seed + static_cast<unsigned>(i);
-    const Rod rod = forging(options, seed);
+    const Rod rod = forging(options.out_of_round, seed);
     const Session exact = observe(rod, {.observations = kObservations, .seed = seed});
     if (auto done = add_forging(rod, exact, floor); !done) return done;
     std::mt19937 generator(seed + 500);
@@ -264,10 +200,11 @@ Result<void> run(const Options& options) {
     fmt::print(stderr, "forging {} of {}\n", i + 1, options.forgings);
   }
   fmt::print("{} forgings, out of round by {:.1f} mm, steps of 3 mm per mm; seeds from {}\n", options.forgings,
-             options.out_of_round_mm, options.seed);
+             options.out_of_round.mean_mm, options.seed);
   print_figure_17(floor, seen);
   print_goals(floor, seen);
   if (auto done = time_of(*last); !done) return done;
+  if (auto done = print_laser_table(options.specimens, options.seed, options.out_of_round); !done) return done;
   return laboratory(options);
 }
 
@@ -275,14 +212,20 @@ Result<void> run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"[D] tables 2 to 4 and figure 17 on exactly known forgings, beside the thesis's estimators"};
+  CLI::App app{"[D] tables 1 to 4 and figure 17 on exactly known forgings, beside the thesis's estimators"};
   app.add_option("--forgings", options.forgings, "0: the time only")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  app.add_option("--intervals", options.intervals, "only how often the 95 % intervals hold, over so many forgings")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_flag("--laser", options.laser_only, "table 1 only, of so many forgings");
   app.add_option("--specimens", options.specimens)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--seed", options.seed)->capture_default_str();
-  app.add_option("--out-of-round-mm", options.out_of_round_mm)->check(CLI::NonNegativeNumber)->capture_default_str();
-  app.add_option("--wave-mm", options.wave_mm, "how quickly the out-of-round changes along the forging")
+  app.add_option("--out-of-round-mm", options.out_of_round.mean_mm)
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--wave-mm", options.out_of_round.wave_mm, "how quickly the out-of-round changes along the forging")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "lib/geometry/rotation.h"
+#include "tests/unit/fusion/comparison/laser_scan.h"
 #include "tests/unit/fusion/triangulate/forging_sessions.h"
 
 namespace imprint::test {
@@ -31,25 +32,9 @@ Measurement perfect(const Rod& rod, double axis_ci95_mm, double diameter_ci95_mm
   return m;
 }
 
-/// What two scanners see, [D] 2.2.1: points 3 mm apart with 2 mm of ranging noise, one from either side and above;
-/// what lies below stays in the dark.
 std::vector<Eigen::Vector3d> scan(const Rod& rod, const Eigen::Matrix3d& R, const Eigen::Vector3d& origin_mm,
                                   unsigned seed) {
-  constexpr double kSpacingMm = 3.0, kNoiseMm = 2.0;
-  std::mt19937 generator(seed);
-  std::normal_distribution<double> normal;
-  std::vector<Eigen::Vector3d> points;
-  for (double x = 0.0; x <= rod.length_mm; x += kSpacingMm) {
-    const double pitch = kSpacingMm / rod.radius(x);
-    for (const double side : {0.093 * M_PI, 0.907 * M_PI}) {  // 4 m away, 1.2 m above the forging
-      for (double theta = side - 0.42 * M_PI; theta < side + 0.42 * M_PI; theta += pitch) {
-        // Noise along the scanner's line of sight.
-        const Eigen::Vector3d sight(0.0, std::cos(side), std::sin(side));
-        points.emplace_back(R * (rod.surface(x, theta) + kNoiseMm * normal(generator) * sight) + origin_mm);
-      }
-    }
-  }
-  return points;
+  return scanned(rod, {R, origin_mm}, {}, seed);
 }
 
 Rod forging() {

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "fusion/faceted/section_evidence.h"
 #include "fusion/fusion_pipeline.h"
 #include "tests/unit/fusion/triangulate/forging_sessions.h"
 
@@ -61,7 +62,7 @@ TEST_CASE("faceted: a 300 x 300 bar from six observations is known to be square,
   REQUIRE(m->facets.size() == m->sections.size());
   const WidthErrors errors = width_errors(*m, {300.0, 300.0});
   INFO("rms " << errors.rms << ", largest " << errors.largest << ", covered " << errors.covered);
-  CHECK(errors.rms < 0.15);     // what 0.15 px, 0.2 mm each, leave of some nine tangents a corner
+  CHECK(errors.rms < 0.15);      // what 0.15 px, 0.2 mm each, leave of some nine tangents a corner
   CHECK(errors.largest < 0.45);  // of 1,000 widths; the goal is 0.3 mm as a sigma
   CHECK(errors.covered > 0.9);
   const SectionFacets& last = m->facets.back();
@@ -106,6 +107,18 @@ TEST_CASE("faceted: a round forging stays round, out of round by 5 mm or not") {
   REQUIRE(m);
   CHECK(m->section_kind == SectionKind::round);
   CHECK(m->facets.empty());
+}
+
+TEST_CASE("faceted: a stepped round forging of which scale hides now the thick, now the thin part changes no width") {
+  Session session = observe(stepped_rod(), {.observations = 3, .step_deg = 60.0, .noise_px = 0.1, .seed = 9});
+  for (std::size_t k = 0; k < session.imprints.size(); ++k)
+    for (Imprint& imprint : session.imprints[k])
+      for (std::size_t i = 0; i < kImprintStations; ++i) {
+        const bool thick = i > 120 && i < 280;  // of either direction of the stations, most of what is thickest
+        if (thick == (k % 2 == 0)) imprint.upper.weight[i] = imprint.lower.weight[i] = 0.0;
+      }
+  // Two views that share no station say nothing of each other; the first and the third do.
+  CHECK(change_of_width(session.imprints) < 0.2 * kRoundestFaceted);
 }
 
 }  // namespace imprint

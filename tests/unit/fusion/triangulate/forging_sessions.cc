@@ -117,6 +117,9 @@ Deviation deviation(const Measurement& measured, const Rod& rod, const Session& 
     d.diameter_covered += std::abs(diameter) <= section.diameter_ci95_mm ? 1.0 : 0.0;
     d.circularity_covered += std::abs(circularity) <= section.circularity_ci95_mm ? 1.0 : 0.0;
     d.axis_ci95 += section.axis_ci95_mm;
+    d.axis_in_ci += std::pow(axis / section.axis_ci95_mm, 2);
+    d.diameter_in_ci += std::pow(diameter / section.diameter_ci95_mm, 2);
+    d.circularity_in_ci += std::pow(circularity / section.circularity_ci95_mm, 2);
     count += 1.0;
   }
   const auto rms = [](auto first, auto last) {
@@ -135,7 +138,7 @@ Deviation deviation(const Measurement& measured, const Rod& rod, const Session& 
   d.axis_covered /= count;
   d.diameter_covered /= count;
   d.circularity_covered /= count;
-  d.axis_ci95 /= count;
+  for (double* sum : {&d.axis_ci95, &d.axis_in_ci, &d.diameter_in_ci, &d.circularity_in_ci}) *sum /= count;
   return d;
 }
 
