@@ -50,9 +50,10 @@ void add_report_command(Cli& cli);
 void add_compare_command(Cli& cli);
 void add_straighten_command(Cli& cli);
 void add_simulate_command(Cli& cli);
-void add_live_commands(Cli& cli);       // status, watch, trigger
-void add_remote_commands(Cli& cli);     // log, peek, config, bundle
+void add_live_commands(Cli& cli);    // status, watch, trigger
+void add_remote_commands(Cli& cli);  // log, peek, config, bundle
 void add_certs_command(Cli& cli);
+void add_fleet_command(Cli& cli);
 void add_users_command(Cli& cli);
 void add_recording_commands(Cli& cli);  // record, replay
 

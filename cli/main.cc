@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   imprint::add_recording_commands(cli);
   imprint::add_remote_commands(cli);
   imprint::add_certs_command(cli);
+  imprint::add_fleet_command(cli);
   imprint::add_users_command(cli);
   if (const auto status = imprint::parse_command_line(cli.app, argc, argv)) return *status;
   try {

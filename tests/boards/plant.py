@@ -1,0 +1,146 @@
+"""A plant for one emulated board: authority, fusion on TLS, a rendered rig, and the board's folder (board.toml, identity/, rig/).
+
+The guest reaches this machine at 10.0.2.2, QEMU's user network.
+"""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SCENE = ROOT / "tests/data/small_forge.toml"
+HOST_IN_GUEST = "10.0.2.2"
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Plant:
+    def __init__(self, build, folder):
+        self.build, self.folder = pathlib.Path(build).resolve(), pathlib.Path(folder)
+        self.port = free_port()
+        self.certs = self.folder / "certs"
+        self.fusion = None
+        shutil.rmtree(self.certs, ignore_errors=True)
+        self.imprint("certs", "init", "--plant", "forge", "--dir", self.certs)
+        self.issue("fusion", "fusion", "--host", "127.0.0.1", "--host", HOST_IN_GUEST)
+        self.issue("engineer", "engineer")
+        self.rig = self.folder / "rig"
+        if not (self.rig / "session.toml").exists():
+            self.imprint("simulate", SCENE, "--out", self.rig)
+
+    def imprint(self, *arguments, timeout_s=300, check=True):
+        done = subprocess.run([str(self.build / "cli/imprint"), *map(str, arguments)], capture_output=True, text=True, timeout=timeout_s,
+                              check=False)
+        if check and done.returncode != 0:
+            raise RuntimeError(f"imprint {' '.join(map(str, arguments))}: {done.stderr}")
+        return done
+
+    def issue(self, name, role, *arguments):
+        self.imprint("certs", "issue", name, "--role", role, *arguments, "--dir", self.certs)
+
+    def line(self):
+        """Options that make a command speak to this line as its engineer."""
+        return ("--connect", f"tls/127.0.0.1:{self.port}", "--identity", self.certs / "issued/engineer")
+
+    def board_folder(self, camera="cam1"):
+        folder = self.folder / f"board-{camera}"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        self.issue(camera, "camera")
+        shutil.copytree(self.certs / "issued" / camera, folder / "identity")
+        shutil.copytree(self.rig, folder / "rig")
+        (folder / "board.toml").write_text(
+            f'[board]\nkind = "uefi-amd64"\ncamera_id = "{camera}"\n[network]\naddress = "dhcp"\ndns = []\n'
+            f'[time]\nservers = ["{HOST_IN_GUEST}"]\n[fusion]\nconnect = ["tls/{HOST_IN_GUEST}:{self.port}"]\n'
+            '[camera]\nsource = "folder"\n')
+        return folder
+
+    def __enter__(self):
+        config = self.folder / "fusion.toml"
+        config.write_text(
+            f'[fusion]\nrig = "{self.rig}/rig.toml"\ndatabase = "imprint.db"\n[zenoh]\nlisten = ["tls/127.0.0.1:{self.port}"]\n'
+            f'identity = "{self.certs}/issued/fusion"\naccess = "{self.certs}/access.json"\n[page]\nport = 0\n')
+        with (self.folder / "fusion.log").open("ab") as log:
+            self.fusion = subprocess.Popen([str(self.build / "fusion/imprint-fusion"), "--config", str(config)], stdout=log, stderr=log)
+        return self
+
+    def __exit__(self, *_):
+        self.fusion.send_signal(signal.SIGTERM)
+        try:
+            self.fusion.wait(30)
+        except subprocess.TimeoutExpired:
+            self.fusion.kill()
+            self.fusion.wait()
+
+    def camera(self, camera="cam1"):
+        """What fusion knows of the camera; nothing when it is not connected."""
+        done = self.imprint("status", *self.line(), "--json", check=False)
+        if done.returncode != 0:
+            return None
+        found = next(c for c in json.loads(done.stdout)["cameras"] if c["id"] == camera)
+        return found if found["alive"] else None
+
+    def firmware(self, camera="cam1"):
+        """What the board says of its image; nothing when it does not answer."""
+        done = self.imprint("fleet", "status", *self.line(), "--camera", camera, "--timeout", 5, "--json", check=False)
+        if done.returncode != 0:
+            return None
+        return json.loads(done.stdout)["boards"][0]
+
+
+def wait_for(condition, timeout_s, what, still_there=lambda: True):
+    begin = time.monotonic()
+    while time.monotonic() - begin < timeout_s:
+        if not still_there():
+            raise RuntimeError(f"the board has ended while waited for: {what}")
+        found = condition()
+        if found:
+            return found, time.monotonic() - begin
+        time.sleep(2)
+    raise RuntimeError(f"not within {timeout_s} s: {what}")
+
+
+class Board:
+    """A disk that runs in QEMU under UEFI; what it prints goes to `console`."""
+
+    def __init__(self, disk, console, memory="1G", usb=None):
+        self.disk, self.console, self.memory, self.usb = disk, console, memory, usb
+        self.variables = pathlib.Path(str(disk) + ".vars")
+        shutil.copy("/usr/share/OVMF/OVMF_VARS_4M.fd", self.variables)
+        self.process = None
+
+    def start(self):
+        command = ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", self.memory,
+                   "-nographic", "-drive", "if=pflash,format=raw,readonly=on,file=/usr/share/OVMF/OVMF_CODE_4M.fd",
+                   "-drive", f"if=pflash,format=raw,file={self.variables}",
+                   "-drive", f"if=none,id=disk,file={self.disk},format=raw,cache=writeback",
+                   "-device", "virtio-blk-pci,drive=disk,bootindex=0", "-nic", "user,model=virtio-net-pci",
+                   "-device", "i6300esb", "-watchdog-action", "reset"]
+        with self.console.open("ab") as out:
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+
+    def running(self):
+        return self.process is not None and self.process.poll() is None
+
+    def cut_power(self):
+        if self.running():
+            os.kill(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+
+    def printed(self):
+        return self.console.read_text(encoding="utf-8", errors="replace") if self.console.exists() else ""
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.cut_power()

@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""An amd64 image in QEMU under UEFI: it boots to a publishing node; an update goes to the other slot and is judged good; a
+stranger's bundle is refused; an image whose node does not run goes back by itself; power cut at random moments of an
+update leaves a board that boots and measures."""
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import time
+
+import guest
+from guest import run
+import plant
+
+PATIENCE_S = 120  # of a slot that is judged; the guest is emulated
+BOOT_S = 600      # on two busy cores
+CUTS = int(os.environ.get("IMPRINT_POWER_CUTS", "2"))
+SEED = int(os.environ.get("IMPRINT_SEED", str(int(time.time()))))
+
+import make_bundle  # of deploy/image, whose place guest knows
+import make_disk
+import make_root
+
+
+def prepare(image):
+    """The image, and bundles of it: of another version, of a stranger, and one whose node does not run."""
+    work = image / "work"
+    if not (work / "root.squashfs").exists():
+        run(sys.executable, plant.ROOT / "deploy/image/image.py", "--board", "amd64", "--out", image)
+    variants = work / "variants"
+    variants.mkdir(exist_ok=True)
+    keys, stranger = guest.CACHE / "keys", guest.CACHE / "stranger"
+    make_bundle.make_development_keys(stranger)
+    if (variants / "v3.raucb").exists() and (variants / "v3.raucb").stat().st_mtime > (work / "root.squashfs").stat().st_mtime:
+        return work
+    os.environ.setdefault("SOURCE_DATE_EPOCH", "1700000000")
+    root, packed = work / "root", work / "variant.squashfs"
+    node, version = root / "usr/bin/imprint-node", (root / "etc/imprint-version").read_text()
+    good_node = node.read_bytes()
+
+    def bundle(name, number, who):
+        make_bundle.make_bundle(variants / name, packed, work, "imprint-board-amd64", number, who / "cert.pem", who / "key.pem")
+
+    (root / "etc/imprint-version").write_text("2\n")
+    make_root.pack_root(root, packed)
+    bundle("v2.raucb", "2", keys)
+    bundle("evil.raucb", "2", stranger)
+    (root / "etc/imprint-version").write_text("3\n")
+    node.write_text("#!/bin/sh\nexit 1\n")
+    make_root.pack_root(root, packed)
+    bundle("v3.raucb", "3", keys)
+    node.write_bytes(good_node)
+    (root / "etc/imprint-version").write_text(version)
+    packed.unlink()
+    return work
+
+
+def make_board(line, work, folder):
+    options = folder / "board.cfg"
+    options.write_text(f'set board_options="imprint.patience_s={PATIENCE_S}"\n')
+    disk = folder / "disk.img"
+    make_disk.make_disk(disk, work / "root.squashfs", work, line.board_folder("cam1"), options, 512)
+    console = folder / "console.log"
+    console.unlink(missing_ok=True)
+    return plant.Board(disk, console)
+
+
+class Cycle:
+    def __init__(self, line, board, work):
+        self.line, self.board, self.bundles = line, board, work / "variants"
+        self.faults = []
+
+    def check(self, claim, holds, detail=""):
+        print(f"{'ok  ' if holds else 'FAIL'} {claim}{': ' + str(detail) if detail else ''}", flush=True)
+        if not holds:
+            self.faults.append(claim)
+
+    def wait_good(self):
+        """The board's own word that its slot is good."""
+        def good():
+            state = self.line.firmware()
+            return state if state and state["slot_good"] else None
+        return plant.wait_for(good, BOOT_S, "a slot judged good", self.board.running)
+
+    def update(self, bundle, version):
+        return self.line.imprint("fleet", "update", *self.line.line(), "--camera", "cam1", "--bundle", self.bundles / bundle, "--version",
+                                 version, "--serve", f"{plant.HOST_IN_GUEST}:{plant.free_port()}", "--board-timeout", 2 * BOOT_S, "--timeout", 5,
+                                 timeout_s=2 * BOOT_S + 60, check=False)
+
+    def boots_and_measures(self):
+        state, took_s = self.wait_good()
+        self.check("the image boots to a publishing node, its slot is judged good", state["slot"] == "A", f"{took_s:.0f} s, {state['image_version']}")
+        self.line.imprint("trigger", *self.line.line(), "--session", "S", "--observation", 0, "--rotation-deg", 0, "--expect", 1, check=False)
+        def seen():
+            camera = self.line.camera()
+            return camera if camera and camera["health"]["frames"] else None
+        camera, _ = plant.wait_for(seen, 300, "a frame", self.board.running)
+        self.check("a triggered frame shows its targets", camera["health"]["targets_seen"] >= 10, camera["health"]["targets_seen"])
+
+    def refuses_a_stranger(self):
+        done = self.update("evil.raucb", "2")
+        self.check("a bundle signed by a stranger is refused", done.returncode == 1 and "signature" in done.stderr, done.stderr.strip().splitlines()[-1])
+        state = self.line.firmware()
+        self.check("and nothing has changed", state and state["slot"] == "A" and state["slot_good"])
+
+    def survives_power_cuts(self, count):
+        dice = random.Random(SEED)
+        print(f"seed of the cuts: {SEED}", flush=True)
+        for number in range(count):
+            wish = subprocess.Popen([str(self.line.build / "cli/imprint"), "fleet", "update", *map(str, self.line.line()), "--camera", "cam1",
+                                     "--bundle", str(self.bundles / "v2.raucb"), "--version", "2", "--serve",
+                                     f"{plant.HOST_IN_GUEST}:{plant.free_port()}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            after_s = dice.uniform(1, 150)
+            time.sleep(after_s)
+            self.board.cut_power()
+            wish.kill()
+            wish.wait()
+            self.board.start()
+            state, took_s = self.wait_good()
+            self.check(f"power cut {number + 1}, {after_s:.0f} s into an update: the board boots and is good", True,
+                       f"version {state['image_version']} from slot {state['slot']} after {took_s:.0f} s")
+
+    def updates(self):
+        begin = time.monotonic()
+        done = self.update("v2.raucb", "2")
+        state = self.line.firmware()
+        self.check("an update goes to the other slot, boots and is judged good",
+                   done.returncode == 0 and state and state["image_version"] == "2" and state["slot_good"],
+                   f"{state and state['slot']} in {time.monotonic() - begin:.0f} s {done.stderr.strip()[-300:]}")
+
+    def goes_back(self):
+        before = self.line.firmware()
+        done = self.update("v3.raucb", "3")
+        state, _ = self.wait_good()
+        self.check("an image whose node does not run goes back by itself, and says why",
+                   done.returncode == 1 and state["image_version"] == before["image_version"] and "slot" in state["rolled_back"],
+                   done.stderr.strip().splitlines()[-1:])
+
+
+def main(build):
+    if os.geteuid() != 0:
+        print("needs root, to make a root file system")
+        return 1
+    folder = guest.CACHE / "update"
+    shutil.rmtree(folder / "certs", ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    work = prepare(pathlib.Path(build).resolve() / "image")
+    line = plant.Plant(build, folder)
+    with line, make_board(line, work, folder) as board:
+        cycle = Cycle(line, board, work)
+        try:
+            cycle.boots_and_measures()
+            cycle.refuses_a_stranger()
+            cycle.updates()
+            cycle.goes_back()
+            cycle.survives_power_cuts(CUTS)
+        except RuntimeError as error:
+            cycle.check(str(error), False)
+        if cycle.faults:
+            print(board.printed()[-3000:])
+    return 1 if cycle.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
