@@ -37,26 +37,54 @@ std::string to_toml(const HealthLimits& limits) {
       limits.records);
 }
 
+SessionPlan read_plan(TomlReader& read, const std::string& section, SessionPlan plan) {
+  plan.session = read.string(section + ".session", plan.session);
+  plan.observations =
+      static_cast<int>(std::clamp<std::int64_t>(read.integer(section + ".observations", plan.observations), 0, 1000));
+  plan.rotation_step_deg = read.number(section + ".rotation_step_deg", plan.rotation_step_deg);
+  plan.new_session_s = read.number(section + ".new_session_s", plan.new_session_s);
+  return plan;
+}
+
+std::string to_toml(const SessionPlan& plan) {
+  return fmt::format("session = {}\nobservations = {}\nrotation_step_deg = {}\nnew_session_s = {}\n",
+                     toml_text(plan.session), plan.observations, toml_number(plan.rotation_step_deg),
+                     toml_number(plan.new_session_s));
+}
+
 PlcConfig read_plc(TomlReader& read) {
   PlcConfig plc;
   plc.input = read.path("plc.input", plc.input);
-  plc.session = read.string("plc.session", plc.session);
-  plc.observations =
-      static_cast<int>(std::clamp<std::int64_t>(read.integer("plc.observations", plc.observations), 0, 1000));
-  plc.rotation_step_deg = read.number("plc.rotation_step_deg", plc.rotation_step_deg);
+  plc.plan = read_plan(read, "plc", plc.plan);
   plc.debounce_ms = read.number("plc.debounce_ms", plc.debounce_ms);
-  plc.new_session_s = read.number("plc.new_session_s", plc.new_session_s);
   if (const auto valid = plc.validate(); !valid) read.fault("plc", valid.error().message);
   return plc;
 }
 
 std::string to_toml(const PlcConfig& plc) {
   if (plc.input.empty()) return {};
-  return fmt::format(
-      "\n[plc]\ninput = {}\nsession = {}\nobservations = {}\nrotation_step_deg = {}\ndebounce_ms = {}\nnew_session_s = "
-      "{}\n",
-      toml_text(plc.input.string()), toml_text(plc.session), plc.observations, toml_number(plc.rotation_step_deg),
-      toml_number(plc.debounce_ms), toml_number(plc.new_session_s));
+  return fmt::format("\n[plc]\ninput = {}\n{}debounce_ms = {}\n", toml_text(plc.input.string()), to_toml(plc.plan),
+                     toml_number(plc.debounce_ms));
+}
+
+RestTriggerConfig read_rest(TomlReader& read) {
+  RestTriggerConfig rest;
+  rest.accept = read.boolean("rest.accept", rest.accept);
+  rest.plan = read_plan(read, "rest", rest.plan);
+  rest.lead_ms = read.number("rest.lead_ms", rest.lead_ms);
+  rest.quiet_s = read.number("rest.quiet_s", rest.quiet_s);
+  if (const auto valid = rest.validate(); !valid) read.fault("rest", valid.error().message);
+  return rest;
+}
+
+std::string to_toml(const RestTriggerConfig& rest) {
+  return fmt::format("\n[rest]\naccept = {}\n{}lead_ms = {}\nquiet_s = {}\n", rest.accept, to_toml(rest.plan),
+                     toml_number(rest.lead_ms), toml_number(rest.quiet_s));
+}
+
+std::string lines_to_toml(const std::vector<std::filesystem::path>& lines) {
+  if (lines.empty()) return {};
+  return fmt::format("lines = {}\n", toml_list({lines.begin(), lines.end()}));
 }
 
 bool is_tls(const std::string& endpoint) { return endpoint.starts_with("tls/"); }
@@ -71,6 +99,7 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
              "fusion.rig",
              "fusion.database",
              "fusion.result_dir",
+             "fusion.lines",
              "fusion.deadline_s",
              "fusion.max_spread_s",
              "fusion.max_clock_offset_s",
@@ -99,7 +128,14 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
              "plc.observations",
              "plc.rotation_step_deg",
              "plc.debounce_ms",
-             "plc.new_session_s"});
+             "plc.new_session_s",
+             "rest.accept",
+             "rest.session",
+             "rest.observations",
+             "rest.rotation_step_deg",
+             "rest.new_session_s",
+             "rest.lead_ms",
+             "rest.quiet_s"});
   config.site = read_id(read, "fusion.site", config.site);
   config.line = read_id(read, "fusion.line", config.line);
   config.rig = read.path("fusion.rig");
@@ -108,6 +144,8 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   config.assembler.deadline_s = read.number("fusion.deadline_s", config.assembler.deadline_s);
   config.assembler.max_spread_s = read.number("fusion.max_spread_s", config.assembler.max_spread_s);
   config.assembler.max_clock_offset_s = read.number("fusion.max_clock_offset_s", config.assembler.max_clock_offset_s);
+  for (const std::string& file : read.strings("fusion.lines", std::vector<std::string>{}))
+    config.lines.push_back(std::filesystem::absolute(path).parent_path() / file);
   config.method = read_choice(read, "fusion.method", kMethods, config.method);
   config.geometry =
       geometry_method_of(read_choice(read, "fusion.geometry", kGeometryMethods, std::string(name_of(config.geometry))));
@@ -131,6 +169,7 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   if (!config.page.is_local()) config.page.identity = config.zenoh.identity;
   config.alarms = read_alarms(read);
   config.plc = read_plc(read);
+  config.rest = read_rest(read);
   if (const auto valid = config.page.validate(); !valid) read.fault("page.address", without_key(valid.error().message));
   if (config.zenoh.listen.empty() && config.zenoh.connect.empty()) {
     read.fault("zenoh.listen", "no endpoint here nor in zenoh.connect: no camera could reach this program");
@@ -141,19 +180,20 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
 
 std::string to_toml(const FusionConfig& config) {
   return fmt::format(
-      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}deadline_s = {}\nmax_spread_s = {}\n"
+      "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}{}deadline_s = {}\nmax_spread_s = {}\n"
       "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n"
       "[zenoh]\n{}{}\n[page]\naddress = {}\nport = {}\n{}insecure = {}\naudit = {}\n\n{}",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
-      toml_number(config.assembler.deadline_s), toml_number(config.assembler.max_spread_s),
+      lines_to_toml(config.lines), toml_number(config.assembler.deadline_s), toml_number(config.assembler.max_spread_s),
       toml_number(config.assembler.max_clock_offset_s), toml_text(config.method), toml_text(name_of(config.geometry)),
       toml_text(config.log_level), zenoh_to_toml(config.zenoh),
       config.access.empty() ? "" : fmt::format("access = {}\n", toml_text(config.access.string())),
       toml_text(config.page.address), config.page.port,
       config.page.users.empty() ? "" : fmt::format("users = {}\n", toml_text(config.page.users.string())),
-      config.page.insecure, toml_text(config.page.audit.string()), to_toml(config.alarms) + to_toml(config.plc));
+      config.page.insecure, toml_text(config.page.audit.string()),
+      to_toml(config.alarms) + to_toml(config.plc) + to_toml(config.rest));
 }
 
 }  // namespace imprint

@@ -2,10 +2,12 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "fusion/geometry_method.h"
 #include "fusion/plc_input.h"
 #include "fusion/receive/observation_assembler.h"
+#include "fusion/rest_trigger.h"
 #include "fusion/serve/page_server.h"
 #include "lib/config/toml_file.h"
 #include "lib/result/result.h"
@@ -19,7 +21,8 @@ struct FusionConfig {
   std::string line = "L1";
   std::filesystem::path rig;
   std::filesystem::path database = "imprint.db";
-  std::filesystem::path result_dir;  // empty: none
+  std::filesystem::path result_dir;          // empty: none
+  std::vector<std::filesystem::path> lines;  // fusion.toml of further lines that the same program fuses
   std::string method = "best";
   GeometryMethod geometry = GeometryMethod::joint;
   std::string log_level = "info";
@@ -29,6 +32,7 @@ struct FusionConfig {
   PageConfig page;
   HealthLimits alarms;
   PlcConfig plc;
+  RestTriggerConfig rest;
 };
 
 /// Reads the table of `fusion.toml`; `path` is what relative paths and messages refer to.

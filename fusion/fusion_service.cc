@@ -37,6 +37,7 @@ FusionService::FusionService(FusionConfig config, Rig rig, Transport& transport,
       board_(board),
       fuse_(std::move(fuse)),
       assembler_(camera_ids(rig_), config_.assembler),
+      rest_(config_.rest),
       queue_(std::make_shared<BoundedQueue<Message>>(kMaxQueued)),
       liveness_(std::make_shared<BoundedQueue<Message>>(kMaxQueuedLiveness)),
       queries_(std::make_shared<BoundedQueue<std::shared_ptr<Query>>>(kMaxQueuedQueries)) {}
@@ -81,6 +82,7 @@ Result<void> FusionService::subscribe() {
       transport_.subscribe(keys_->imprint(), {.history = kImprintHistory}, queueing(Kind::imprint), on_miss),
       transport_.subscribe(keys_->health(), {.history = 0}, queueing(Kind::health)),
       transport_.subscribe(keys_->delivery(), {.history = 0}, queueing(Kind::delivery)),
+      transport_.subscribe(keys_->rest(), {.history = 0}, queueing(Kind::rest)),
       transport_.watch_liveness(keys_->alive(), on_liveness),
       transport_.answer(keys_->fusion_service("status"), on_query),
       transport_.answer(keys_->fusion_service("result"), on_query),
@@ -159,6 +161,8 @@ void FusionService::handle(const Message& message) {
       return receive_health(message);
     case Kind::delivery:
       return receive_delivery(message);
+    case Kind::rest:
+      return receive_rest(message);
     case Kind::wake:
       return;
     case Kind::alive:
@@ -245,6 +249,22 @@ void FusionService::receive_delivery(const Message& message) {
     return malformed(message, fmt::format("carries the report of camera {}", delivery->camera_id));
   }
   desk_->receive(*delivery, std::chrono::steady_clock::now());
+}
+
+void FusionService::receive_rest(const Message& message) {
+  const auto rest = decode_rest(message.bytes);
+  if (!rest) return malformed(message, rest.error().message);
+  if (keys_->camera_of(message.key) != rest->camera_id)
+    return malformed(message, fmt::format("carries the word of camera {}", rest->camera_id));
+  const auto trigger = rig_.find_camera(rest->camera_id) == nullptr
+                           ? std::nullopt
+                           : rest_.note(std::chrono::steady_clock::now(), wall_clock_ns());
+  spdlog::info("camera {} sees the forging come to rest: {}", rest->camera_id,
+               trigger               ? fmt::format("session {} observation {}", trigger->session, trigger->observation)
+               : config_.rest.accept ? "already known"
+                                     : "rest.accept is off, nothing is fired");
+  if (!trigger) return;
+  if (const auto fired = fire(*trigger); !fired) spdlog::error("not triggered: {}", fired.error().message);
 }
 
 void FusionService::receive_liveness(const std::string& camera_id, bool alive) {

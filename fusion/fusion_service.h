@@ -16,6 +16,7 @@
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_pipeline.h"
 #include "fusion/receive/observation_assembler.h"
+#include "fusion/rest_trigger.h"
 #include "fusion/result_announcer.h"
 #include "fusion/serve/line_board.h"
 #include "fusion/store/session_store.h"
@@ -53,7 +54,7 @@ class FusionService {
   [[nodiscard]] std::uint64_t turns() const { return turns_; }
 
  private:
-  enum class Kind { trigger, imprint, health, delivery, alive, gone, wake };
+  enum class Kind { trigger, imprint, health, delivery, rest, alive, gone, wake };
   struct Message {
     Kind kind;
     std::string key;
@@ -69,6 +70,7 @@ class FusionService {
   void receive_imprint(const Message& message);
   void receive_health(const Message& message);
   void receive_delivery(const Message& message);
+  void receive_rest(const Message& message);
   void receive_liveness(const std::string& camera_id, bool alive);
   /// Puts a stored session back into the assembler, each message as old as it is.
   void recall(const std::string& session);
@@ -96,6 +98,7 @@ class FusionService {
   std::optional<DeliveryDesk> desk_;
   std::optional<ResultAnnouncer> announcer_;
   std::optional<ClockWatch> clocks_;
+  RestTrigger rest_;
   std::deque<std::string> backlog_;  // sessions whose result may be due, but whose imprints are only in the store
   std::shared_ptr<BoundedQueue<Message>> queue_;
   std::shared_ptr<BoundedQueue<Message>> liveness_;  // of their own, so that a flood of messages cannot hide them

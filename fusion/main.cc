@@ -1,30 +1,31 @@
+#include <algorithm>
 #include <iostream>
 
 #include "fusion/access_file.h"
 #include "fusion/fusion_config.h"
-#include "fusion/fusion_service.h"
+#include "fusion/fusion_line.h"
 #include "fusion/peer_log.h"
-#include "fusion/serve/page_server.h"
-#include "fusion/store/session_store.h"
 #include "lib/daemon/program.h"
 #include "lib/daemon/stop_signal.h"
 #include "lib/daemon/systemd_notice.h"
 #include "lib/log/log.h"
-#include "lib/service/document_desk.h"
-#include "lib/service/log_document.h"
 
 namespace imprint {
 namespace {
+
+using Lines = std::vector<std::unique_ptr<FusionLine>>;  // the first one's config is the program's own
 
 constexpr auto kIdleWait = std::chrono::milliseconds(1000);
 
 enum class Ended { stopped, access_changed };
 
-// Until told to stop, or the access list is another: the watchdog as long as the worker gets on.
-Ended attend(const FusionService& service, AccessFile& access, StopSignal& stop) {
+// Until told to stop, or the access list is another: the watchdog as long as the worker of every line gets on.
+Ended attend(const Lines& lines, AccessFile& access, StopSignal& stop) {
   const auto period = watchdog_period();
   const auto wait = std::min(period.value_or(kIdleWait), kIdleWait);
-  LoopWatchdog watchdog([&] { return service.turns(); });
+  std::vector<LoopWatchdog::Turns> loops;
+  for (const auto& line : lines) loops.emplace_back([&line] { return line->turns(); });
+  LoopWatchdog watchdog(std::move(loops));
   bool hung = false;
   auto watchdog_due = std::chrono::steady_clock::now() + period.value_or(kIdleWait);
   while (!stop.wait_for(wait)) {
@@ -33,50 +34,67 @@ Ended attend(const FusionService& service, AccessFile& access, StopSignal& stop)
     watchdog_due += *period;
     const bool turned = watchdog.attend();
     if (!turned && !hung)
-      spdlog::error("the worker has not turned for {} ms; systemd is not told that all is well", period->count());
+      spdlog::error("a worker has not turned for {} ms; systemd is not told that all is well", period->count());
     hung = !turned;
   }
   return Ended::stopped;
 }
 
-// A folder, or a name that is free.
-Result<void> check_result_dir(const FusionConfig& config) {
-  std::error_code ignored;
-  if (config.result_dir.empty() || std::filesystem::is_directory(config.result_dir, ignored)) return {};
-  if (!std::filesystem::exists(config.result_dir, ignored)) return {};
-  return invalid_input("fusion.result_dir: {}: expected a folder, found a file", config.result_dir.string());
-}
-
 // One life of the connections. Only a new session takes new access rules; nodes keep what they send meanwhile.
-Result<Ended> serve(const FusionConfig& config, const Rig& rig, AccessFile& access, SessionStore& store,
-                    LineBoard& board, LineControl& control, StopSignal& stop) {
-  ZenohConfig zenoh = config.zenoh;
+Result<Ended> serve(const Lines& lines, AccessFile& access, StopSignal& stop) {
+  ZenohConfig zenoh = lines.front()->config().zenoh;
   auto rules = access.rules();
   if (!rules) return pass_on(rules.error());
   zenoh.access = std::move(*rules);
-  const auto peers = std::make_shared<PeerLog>(access.list(), board);
+  const auto peers = std::make_shared<PeerLog>(access.list(), lines.front()->board());
   if (!zenoh.listen.empty()) zenoh.on_peer = [peers](const PeerNotice& notice) { peers->note(notice); };
   auto transport = open_zenoh(zenoh);
   if (!transport) return pass_on(transport.error());
-  FusionService service(config, rig, **transport, store, board,
-                        [geometry = config.geometry](const auto& observations, const ForgingSpec& forging,
-                                                     std::string session, std::string method) {
-                          return fuse(observations, forging, std::move(session), std::move(method), geometry);
-                        });
-  if (auto started = service.start(); !started) return pass_on(started.error());
-  spdlog::info("fusion of {}/{} ready, {} cameras", config.site, config.line, rig.cameras.size());
-  notify_ready("fusion ready");
-  const auto keys = Keys::of(config.site, config.line);
-  if (!keys) return pass_on(keys.error());
-  const auto desk = DocumentDesk::open(**transport, {{keys->fusion_service("log"), log_document}});
-  if (!desk) return pass_on(desk.error());
-  control.connect([&](const Trigger& trigger) { return service.fire(trigger); });
-  const Ended ended = attend(service, access, stop);
-  if (ended == Ended::stopped) notify_stopping();
-  control.disconnect();
-  service.stop();
-  for (const CameraModel& camera : rig.cameras) board.set_alive(camera.id, false);  // who is let in again says so
+  const auto run = [&]() -> Result<Ended> {
+    for (const auto& line : lines) {
+      if (auto connected = line->connect(**transport); !connected) return pass_on(connected.error());
+    }
+    notify_ready("fusion ready");
+    return attend(lines, access, stop);
+  };
+  const auto ended = run();
+  if (ended && *ended == Ended::stopped) notify_stopping();
+  for (const auto& line : lines) line->disconnect();
   return ended;
+}
+
+// The other files of `fusion.lines`, each one more line over the first one's connections.
+Result<FusionConfig> read_further_line(const std::filesystem::path& file) {
+  const auto table = parse_toml_file(file);
+  if (!table) return pass_on(table.error());
+  if (table->contains("zenoh"))
+    return invalid_input("{}: zenoh: expected in the program's own config alone, which all its lines are reached by",
+                         file.string());
+  auto config = read_fusion_config(file, *table);
+  if (config && !config->lines.empty())
+    return invalid_input("{}: fusion.lines: expected in the program's own config alone", file.string());
+  return config;
+}
+
+Result<Lines> read_lines(FusionConfig own) {
+  Lines lines;
+  const auto add = [&](FusionConfig config) -> Result<void> {
+    auto line = FusionLine::read(std::move(config));
+    if (!line) return pass_on(line.error());
+    for (const auto& other : lines)
+      if (other->name() == (*line)->name())
+        return invalid_input("fusion.lines: {} is there twice: give each its own fusion.line", other->name());
+    lines.push_back(std::move(*line));
+    return {};
+  };
+  const auto files = own.lines;
+  if (auto added = add(std::move(own)); !added) return pass_on(added.error());
+  for (const auto& file : files) {
+    auto config = read_further_line(file);
+    if (!config) return pass_on(config.error());
+    if (auto added = add(std::move(*config)); !added) return pass_on(added.error());
+  }
+  return lines;
 }
 
 Result<void> run(const ProgramOptions& options) {
@@ -89,38 +107,21 @@ Result<void> run(const ProgramOptions& options) {
     std::cout << to_toml(*config);
     return {};
   }
-  const auto rig = read_rig(config->rig);
-  if (!rig) return pass_on(rig.error());
-  if (auto checked = check_result_dir(*config); !checked) return checked;
+  const auto lines = read_lines(*config);
+  if (!lines) return pass_on(lines.error());
   AccessFile access(config->access);
   if (auto rules = access.rules(); !rules) return pass_on(rules.error());
   if (options.check) {
-    if (auto checked = SessionStore::check(config->database); !checked) return checked;
+    for (const auto& line : *lines)
+      if (auto checked = line->check(); !checked) return checked;
     std::cout << options.config.string() << ": OK\n";
     return {};
   }
   if (auto opened = open_log("imprint-fusion", config->log_level); !opened) return opened;
-  for (const std::string& warning : rig->warnings) spdlog::warn("{}", warning);
-  const auto store = SessionStore::open(config->database);
-  if (!store) return pass_on(store.error());
-
-  std::vector<std::string> camera_ids;
-  for (const CameraModel& camera : rig->cameras) camera_ids.push_back(camera.id);
-  LineBoard board({config->site, config->line, config->method, IMPRINT_VERSION}, camera_ids,
-                  std::chrono::steady_clock::now(), config->alarms);
-  LineControl control;
-  const auto page = PageServer::start(config->page, board, **store, control);
-  if (!page) return pass_on(page.error());
-  spdlog::info("page {}://{}:{}/", config->page.identity.empty() ? "http" : "https", config->page.address,
-               (*page)->port());
-  std::unique_ptr<PlcInput> plc;
-  if (!config->plc.input.empty()) {
-    auto started = PlcInput::start(config->plc, control);
-    if (!started) return pass_on(started.error());
-    plc = std::move(*started);
-  }
+  for (const auto& line : *lines)
+    if (auto opened = line->open(); !opened) return opened;
   while (true) {
-    const auto ended = serve(*config, *rig, access, **store, board, control, stop);
+    const auto ended = serve(*lines, access, stop);
     if (!ended) return pass_on(ended.error());
     if (*ended == Ended::stopped) break;
     spdlog::info("{}: changed; connections are made anew by it", config->access.string());

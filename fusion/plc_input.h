@@ -6,22 +6,19 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <string>
 #include <thread>
 
 #include "fusion/serve/line_control.h"
+#include "fusion/trigger_sessions.h"
 #include "lib/result/result.h"
 
 namespace imprint {
 
 /// A PLC's digital input that triggers. All ours.
 struct PlcConfig {
-  std::filesystem::path input{};    // reads 0 or 1, e.g. /sys/class/gpio/gpio17/value; empty: there is none
-  std::string session = "plc";      // sessions are named <this>-<time of their first observation>
-  int observations = 1;             // of a session; the edge after the last begins the next session
-  double rotation_step_deg = 60.0;  // between two observations
-  double debounce_ms = 20.0;        // the input must stand so long to count
-  double new_session_s = 120.0;     // a pause this long begins a new session: a forging was taken away half measured
+  std::filesystem::path input{};  // reads 0 or 1, e.g. /sys/class/gpio/gpio17/value; empty: there is none
+  SessionPlan plan{.session = "plc"};
+  double debounce_ms = 20.0;  // the input must stand so long to count
 
   [[nodiscard]] Result<void> validate() const;
 };
@@ -42,21 +39,6 @@ class RisingEdge {
   Time since_;
 };
 
-/// Which observation of which session an edge is.
-class PlcSessions {
- public:
-  using Time = std::chrono::steady_clock::time_point;
-  explicit PlcSessions(PlcConfig config) : config_(std::move(config)) {}
-
-  Trigger next(Time now, std::int64_t wall_ns);
-
- private:
-  PlcConfig config_;
-  std::string session_;
-  std::uint32_t taken_ = 0;
-  Time last_;
-};
-
 /// Watches the input on a thread of its own, every 2 ms, and fires all cameras at each rise.
 class PlcInput {
  public:
@@ -71,13 +53,13 @@ class PlcInput {
       : config_(config),
         control_(control),
         edge_(std::chrono::duration<double, std::milli>(config.debounce_ms)),
-        sessions_(config) {}
+        sessions_(config.plan) {}
   void watch();
 
   PlcConfig config_;
   LineControl& control_;
   RisingEdge edge_;
-  PlcSessions sessions_;
+  TriggerSessions sessions_;
   std::atomic<bool> stopping_ = false;
   std::thread thread_;
 };

@@ -13,6 +13,7 @@
 #include "node/node_config.h"
 #include "node/node_service.h"
 #include "node/replay/imprint_replay.h"
+#include "node/service/forging_look.h"
 #include "node/service/node_desk.h"
 
 namespace imprint {
@@ -55,6 +56,7 @@ Ended attend(NodeService& service, NodeDesk& desk, RemoteSettings& settings, Sto
     if (watchdog && !service.stuck(kHangLimit)) notify_watchdog();
     if (steady_clock::now() < health_due) continue;
     service.send_health();
+    notify_status(desk.fusion_seen() ? service.condition() : "fusion has not been found yet");
     health_due = steady_clock::now() + health_period;
   }
 }
@@ -67,8 +69,28 @@ struct Parts {
   bool replay = false;
 };
 
+// A camera whose size is not told is set to that of its calibration.
+CameraSettings camera_settings(const NodeConfig& config, const CameraModel& calibrated) {
+  CameraSettings settings = config.camera;
+  if (settings.width_px != 0) return settings;
+  settings.width_px = calibrated.width_px;
+  settings.height_px = calibrated.height_px;
+  return settings;
+}
+
+Result<std::unique_ptr<FrameSource>> open_source(const NodeConfig& config, const CameraModel& calibrated) {
+  if (config.capture_source == "imprints") return open_imprint_replay(config.capture_path, config.camera_id);
+  if (has_camera(config))
+    return open_camera_source(config.capture_source, camera_settings(config, calibrated), config.camera_id);
+  return open_frame_source(config.capture_source, config.capture_path, config.camera_id);
+}
+
+// A camera is only opened to be used: two at a time would disturb each other.
+enum class Purpose { check, measure };
+
 // Everything the config names, opened; fails as the node would with it.
-Result<std::unique_ptr<Parts>> open_parts(const std::filesystem::path& file, const NodeConfig& config) {
+Result<std::unique_ptr<Parts>> open_parts(const std::filesystem::path& file, const NodeConfig& config,
+                                          Purpose purpose) {
   auto parts = std::make_unique<Parts>();
   auto rig = read_rig(config.rig);
   if (!rig) return pass_on(rig.error());
@@ -82,8 +104,8 @@ Result<std::unique_ptr<Parts>> open_parts(const std::filesystem::path& file, con
   if (!method) return pass_on(method.error());
   parts->method = *method;
   parts->replay = config.capture_source == "imprints";
-  auto source = parts->replay ? open_imprint_replay(config.capture_path, config.camera_id)
-                              : open_frame_source(config.capture_source, config.capture_path, config.camera_id);
+  if (purpose == Purpose::check && has_camera(config)) return parts;
+  auto source = open_source(config, *parts->camera);
   if (!source) return pass_on(source.error());
   parts->source = std::move(*source);
   return parts;
@@ -91,27 +113,29 @@ Result<std::unique_ptr<Parts>> open_parts(const std::filesystem::path& file, con
 
 Result<Ended> measure(const ProgramOptions& options, const toml::table& own_table, const NodeConfig& config,
                       RemoteSettings& settings, StopSignal& stop) {
-  const auto parts = open_parts(options.config, config);
+  const auto parts = open_parts(options.config, config, Purpose::measure);
   if (!parts) return pass_on(parts.error());
   for (const std::string& warning : (*parts)->rig.warnings) spdlog::warn("{}", warning);
   auto transport = open_zenoh(config.zenoh);
   if (!transport) return pass_on(transport.error());
   PoseKeeper keeper;  // called by the service's one worker alone
   LastFrame last_frame;
+  ForgingLook eye((*parts)->rig, *(*parts)->camera);  // as the keeper
   NodeService service(
       config, *(*parts)->source,
       [&](const Frame& frame) {
         if ((*parts)->replay) return replayed_imprint(frame);
         ProcessedFrame found = process_frame(frame, *(*parts)->camera, (*parts)->rig, (*parts)->method, &keeper);
         last_frame.keep(frame, found);
+        eye.learn(found);
         return found;
       },
-      **transport);
+      **transport, [&](const Frame& frame) { return eye.see(frame); });
   if (auto started = service.start(); !started) return pass_on(started.error());
   const auto keys = Keys::of(config.site, config.line);
   if (!keys) return pass_on(keys.error());
   const auto check = [&](const NodeConfig& other) -> Result<void> {
-    const auto opened = open_parts(options.config, other);
+    const auto opened = open_parts(options.config, other, Purpose::check);
     if (!opened) return pass_on(opened.error());
     return {};
   };
@@ -119,7 +143,7 @@ Result<Ended> measure(const ProgramOptions& options, const toml::table& own_tabl
                                    settings, last_frame);
   if (!desk) return pass_on(desk.error());
   spdlog::info("camera {} of {}/{} ready, frames from {} {}", config.camera_id, config.site, config.line,
-               config.capture_source, config.capture_path.string());
+               config.capture_source, has_camera(config) ? config.camera.device : config.capture_path.string());
   notify_ready("camera " + config.camera_id + " ready");
   const Ended ended = attend(service, **desk, settings, stop, config.health_period_s);
   if (ended == Ended::stopped) notify_stopping();
@@ -145,7 +169,8 @@ Result<void> run(const ProgramOptions& options, char** argv) {
     return {};
   }
   if (options.check) {
-    if (const auto parts = open_parts(options.config, *own_config); !parts) return pass_on(parts.error());
+    if (const auto parts = open_parts(options.config, *own_config, Purpose::check); !parts)
+      return pass_on(parts.error());
     std::cout << options.config.string() << ": OK\n";
     return {};
   }

@@ -30,14 +30,31 @@ std::int64_t nanoseconds(auto duration) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(duration).count();
 }
 
+// Says since when the worker has been at one piece of work.
+class Busy {
+ public:
+  explicit Busy(std::atomic<std::int64_t>& since_ns) : since_ns_(since_ns) {
+    since_ns_ = nanoseconds(steady_clock::now().time_since_epoch());
+  }
+  ~Busy() { since_ns_ = 0; }
+  Busy(const Busy&) = delete;
+  Busy& operator=(const Busy&) = delete;
+
+ private:
+  std::atomic<std::int64_t>& since_ns_;
+};
+
 }  // namespace
 
-NodeService::NodeService(NodeConfig config, FrameSource& source, ProcessFrame process, Transport& transport)
+NodeService::NodeService(NodeConfig config, FrameSource& source, ProcessFrame process, Transport& transport,
+                         SeeForging see)
     : config_(std::move(config)),
       source_(source),
       process_(std::move(process)),
+      see_(std::move(see)),
       transport_(transport),
-      triggers_(std::make_shared<BoundedQueue<Bytes>>(kMaxQueuedTriggers)) {
+      triggers_(std::make_shared<BoundedQueue<Bytes>>(kMaxQueuedTriggers)),
+      rest_(config_.rest) {
   health_.camera_id = config_.camera_id;
   health_.version = IMPRINT_VERSION;
 }
@@ -65,6 +82,12 @@ Result<void> NodeService::start() {
   auto health = transport_.publish(keys->health(config_.camera_id), {.traffic = Traffic::health, .history = 0});
   if (!health) return pass_on(health.error());
   health_publisher_ = std::move(*health);
+
+  if (config_.rest.trigger && see_) {
+    auto rest = transport_.publish(keys->rest(config_.camera_id), {.traffic = Traffic::command, .history = 0});
+    if (!rest) return pass_on(rest.error());
+    rest_publisher_ = std::move(*rest);
+  }
 
   auto subscribed = transport_.subscribe(keys->trigger(), {.history = 0}, [queue = triggers_](const Sample& sample) {
     if (sample.payload.size() > kMaxTriggerBytes || !queue->push(sample.payload)) {
@@ -101,8 +124,46 @@ bool NodeService::stuck(std::chrono::seconds limit) const {
   return since_ns != 0 && nanoseconds(steady_clock::now().time_since_epoch()) - since_ns > nanoseconds(limit);
 }
 
+std::string NodeService::condition() {
+  const std::lock_guard lock(health_mutex_);
+  if (!health_.capture_fault.empty()) return "no frames: " + health_.capture_fault;
+  if (health_.frames == 0) return "good: no trigger yet";
+  if (health_.targets_seen == 0) return "no targets in the last frame: " + health_.last_error;
+  return fmt::format("good: {} targets in the last of {} frames", health_.targets_seen, health_.frames);
+}
+
 void NodeService::work() {
-  while (const auto message = triggers_->pop()) receive(*message);
+  if (!rest_publisher_) {
+    while (const auto message = triggers_->pop()) receive(*message);
+    return;
+  }
+  const auto period = std::chrono::duration_cast<steady_clock::duration>(
+      std::chrono::duration<double, std::milli>(config_.rest.period_ms));
+  while (!triggers_->finished()) {
+    const auto message = triggers_->pop_until(steady_clock::now() + period);
+    if (message)
+      receive(*message);
+    else if (!triggers_->finished())
+      look();
+  }
+}
+
+void NodeService::look() {
+  const Busy busy(busy_since_ns_);
+  std::optional<Segmentation> forging;
+  try {
+    if (const auto frame = source_.capture(next_request_)) {
+      forging = see_(*frame);
+    } else {
+      spdlog::debug("rest: {}", frame.error().message);
+    }
+  } catch (const std::exception& error) {  // as in make_imprint()
+    spdlog::warn("rest: unexpected: {}", error.what());
+  }
+  if (!rest_.note(forging, steady_clock::now())) return;
+  spdlog::info("the forging has come to rest: fusion is asked for an observation");
+  if (const auto asked = rest_publisher_->put(encode_rest({config_.camera_id, wall_clock_ns()})); !asked)
+    spdlog::error("fusion could not be asked for an observation: {}", asked.error().message);
 }
 
 void NodeService::receive(const Bytes& message) {
@@ -119,9 +180,12 @@ void NodeService::receive(const Bytes& message) {
   std::vector<std::string> warnings;
   if (!await(*trigger, warnings)) return;
 
-  busy_since_ns_ = nanoseconds(steady_clock::now().time_since_epoch());
-  Imprint imprint = make_imprint(*trigger);
-  busy_since_ns_ = 0;
+  Imprint imprint = [&] {
+    const Busy busy(busy_since_ns_);
+    return make_imprint(*trigger);
+  }();
+  const bool last = trigger->observation + 1 == trigger->observations_expected;
+  next_request_ = {trigger->session, last ? 0 : static_cast<int>(trigger->observation) + 1, trigger->rotation_deg};
   imprint.warnings.insert(imprint.warnings.end(), warnings.begin(), warnings.end());
   if (imprint.failure.empty()) {
     if (answered_.size() >= kRememberedAnswers) answered_.pop_front();
@@ -142,11 +206,18 @@ bool NodeService::await(const Trigger& trigger, std::vector<std::string>& warnin
   return !stop_changed_.wait_for(lock, lead, [this] { return stopping_; });
 }
 
+std::int64_t NodeService::moment_of(const Trigger& trigger) const {
+  if (trigger.fire_at_ns == 0) return 0;
+  const std::int64_t moment_ns = trigger.fire_at_ns + clock_->offset_ns();
+  return moment_ns > wall_clock_ns() ? 0 : moment_ns;  // still ahead: was too far ahead to be waited for
+}
+
 Imprint NodeService::make_imprint(const Trigger& trigger) {
   Imprint imprint;
   std::int64_t sensor_time_ns = wall_clock_ns();
   try {
-    auto frame = source_.capture({trigger.session, static_cast<int>(trigger.observation), trigger.rotation_deg});
+    auto frame = source_.capture(
+        {trigger.session, static_cast<int>(trigger.observation), trigger.rotation_deg, moment_of(trigger)});
     if (frame) {
       if (frame->sensor_time_ns == 0) frame->sensor_time_ns = sensor_time_ns;
       sensor_time_ns = frame->sensor_time_ns;
@@ -227,6 +298,11 @@ void NodeService::read_board() {
   health_.housing_temperature_c = housing_.read();
   health_.sensor_temperature_c = sensor_.read();
   health_.clock_offset_s = clock_ ? std::optional(1e-9 * static_cast<double>(clock_->offset_ns())) : std::nullopt;
+  if (const auto capture = source_.status()) {
+    health_.dropped_frames = capture->dropped;
+    health_.capture_restarts = capture->restarts;
+    health_.capture_fault = cut(capture->fault, kMaxErrorBytes);
+  }
   health_.storage_free_mb.reset();
   std::error_code failed;
   const auto space = std::filesystem::space(config_.data_dir, failed);

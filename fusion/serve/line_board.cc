@@ -42,6 +42,9 @@ json health_json(const Health& health, double age) {
           {"exposure_us", health.exposure_us},
           {"gain_db", health.gain_db},
           {"exposure_alarm", health.exposure_alarm},
+          {"dropped_frames", health.dropped_frames},
+          {"capture_restarts", health.capture_restarts},
+          {"capture_fault", health.capture_fault},
           {"pose_state", pose_state_name(health.pose_state)},
           {"last_error", health.last_error},
           {"version", health.version}};
@@ -130,6 +133,9 @@ std::optional<std::string> LineBoard::set_health(const Health& health, Time now)
       "exposure_" + health.camera_id,
       health.exposure_alarm.empty() ? "" : fmt::format("camera {}: {}", health.camera_id, health.exposure_alarm),
       now_ns);
+  alarms_.set("capture_" + health.camera_id,
+              health.capture_fault.empty() ? "" : fmt::format("camera {}: {}", health.camera_id, health.capture_fault),
+              now_ns);
   for (const HealthAlarms::Change& change : health_alarms_.note(health)) alarms_.set(change.name, change.text, now_ns);
   camera->second.health = health;
   camera->second.health_at = now;

@@ -29,6 +29,8 @@ constexpr auto kGauges = std::to_array<Gauge>({
     {"camera_exposure_us", "exposure time of the last frame", "/health/exposure_us"},
     {"camera_frames", "frames taken since the node's start", "/health/frames"},
     {"camera_failed_frames", "of which no imprint could be made", "/health/failed_frames"},
+    {"camera_dropped_frames", "taken by the camera, never whole at the node", "/health/dropped_frames"},
+    {"camera_restarts", "times the camera was lost and opened anew", "/health/capture_restarts"},
     {"camera_housing_temperature_celsius", "of the board", "/health/housing_temperature_c"},
     {"camera_sensor_temperature_celsius", "of the image sensor", "/health/sensor_temperature_c"},
     {"camera_storage_free_megabytes", "on the node's data partition", "/health/storage_free_mb"},

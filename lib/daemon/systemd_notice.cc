@@ -6,6 +6,8 @@ namespace imprint {
 
 void notify_ready(const std::string& status) { sd_notify(0, ("READY=1\nSTATUS=" + status).c_str()); }
 
+void notify_status(const std::string& status) { sd_notify(0, ("STATUS=" + status).c_str()); }
+
 void notify_stopping() { sd_notify(0, "STOPPING=1"); }
 
 void notify_watchdog() { sd_notify(0, "WATCHDOG=1"); }
@@ -17,9 +19,11 @@ std::optional<std::chrono::milliseconds> watchdog_period() {
 }
 
 bool LoopWatchdog::attend() {
-  const std::uint64_t turns = turns_();
-  if (told_at_ == turns) return false;
-  told_at_ = turns;
+  std::vector<std::uint64_t> turns;
+  for (const Turns& loop : loops_) turns.push_back(loop());
+  for (std::size_t i = 0; i < told_at_.size(); ++i)
+    if (told_at_[i] == turns[i]) return false;
+  told_at_ = std::move(turns);
   notify_watchdog();
   return true;
 }

@@ -66,6 +66,22 @@ Result<Delivery> decode_delivery(std::span<const std::uint8_t> bytes) {
   return delivery;
 }
 
+std::vector<std::uint8_t> encode_rest(const Rest& rest) {
+  v1::Rest message;
+  message.set_schema_version(kSchemaVersion);
+  message.set_camera_id(wire_line(rest.camera_id, kMaxIdBytes));
+  message.set_time_ns(rest.time_ns);
+  return bytes_of(message);
+}
+
+Result<Rest> decode_rest(std::span<const std::uint8_t> bytes) {
+  const auto message = parse_message<v1::Rest>(bytes, kMaxBytes);
+  if (!message) return invalid_input("rest: {}", message.error().message);
+  if (auto checked = check_id("camera", message->camera_id()); !checked)
+    return invalid_input("rest: {}", checked.error().message);
+  return Rest{message->camera_id(), message->time_ns()};
+}
+
 std::vector<std::uint8_t> encode_clock_question(const ClockQuestion& question) {
   v1::ClockQuestion message;
   message.set_schema_version(kSchemaVersion);

@@ -34,6 +34,7 @@ std::string Keys::imprint(std::string_view camera_id) const { return camera(came
 std::string Keys::health(std::string_view camera_id) const { return camera(camera_id, "health"); }
 std::string Keys::alive(std::string_view camera_id) const { return camera(camera_id, "alive"); }
 std::string Keys::receipt(std::string_view camera_id) const { return camera(camera_id, "receipt"); }
+std::string Keys::rest(std::string_view camera_id) const { return camera(camera_id, "rest"); }
 std::string Keys::delivery(std::string_view camera_id) const { return camera(camera_id, "delivery"); }
 std::string Keys::service(std::string_view camera_id, std::string_view name) const {
   return camera(camera_id, fmt::format("service/{}", name));

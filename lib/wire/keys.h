@@ -26,6 +26,7 @@ class Keys {
   [[nodiscard]] std::string health(std::string_view camera_id = kAny) const;
   [[nodiscard]] std::string alive(std::string_view camera_id = kAny) const;
   [[nodiscard]] std::string receipt(std::string_view camera_id) const;
+  [[nodiscard]] std::string rest(std::string_view camera_id = kAny) const;
   [[nodiscard]] std::string delivery(std::string_view camera_id = kAny) const;
   /// `name`: config, log, crop, targets or calibration.
   [[nodiscard]] std::string service(std::string_view camera_id = kAny, std::string_view name = kAny) const;

@@ -87,6 +87,10 @@ std::vector<std::uint8_t> encode_health(const Health& health) {
   if (health.storage_free_mb) message.set_storage_free_mb(whole<std::uint32_t>(*health.storage_free_mb));
   if (health.clock_offset_s) message.set_clock_offset_ms(whole<std::int64_t>(1000.0 * *health.clock_offset_s));
   message.set_exposure_alarm(wire_line(health.exposure_alarm, kMaxAlarmBytes));
+  message.set_dropped_frames(health.dropped_frames);
+  message.set_capture_restarts(static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(health.capture_restarts, std::numeric_limits<std::uint32_t>::max())));
+  message.set_capture_fault(wire_line(health.capture_fault, kMaxErrorBytes));
   return bytes_of(message);
 }
 
@@ -124,6 +128,9 @@ Result<Health> decode_health(std::span<const std::uint8_t> bytes) {
   if (message->has_storage_free_mb()) health.storage_free_mb = message->storage_free_mb();
   if (message->has_clock_offset_ms()) health.clock_offset_s = 0.001 * static_cast<double>(message->clock_offset_ms());
   health.exposure_alarm = message->exposure_alarm();
+  health.dropped_frames = message->dropped_frames();
+  health.capture_restarts = message->capture_restarts();
+  health.capture_fault = message->capture_fault();
   return health;
 }
 

@@ -61,7 +61,10 @@ struct Health {
   std::optional<double> sensor_temperature_c{};
   std::optional<double> storage_free_mb{};  ///< on the partition where imprints wait
   std::optional<double> clock_offset_s{};   ///< the node's clock minus fusion's, as fusion has told
-  std::string exposure_alarm{};  ///< one line, cut to 120 bytes; empty: the forging is held out of saturation
+  std::string exposure_alarm{};        ///< one line, cut to 120 bytes; empty: the forging is held out of saturation
+  std::uint64_t dropped_frames = 0;    ///< since start: taken by the camera, never whole at the node
+  std::uint64_t capture_restarts = 0;  ///< since start: times the camera was lost and opened anew
+  std::string capture_fault{};         ///< one line, cut to 80 bytes; empty: frames come
 };
 std::vector<std::uint8_t> encode_health(const Health& health);
 Result<Health> decode_health(std::span<const std::uint8_t> bytes);
@@ -91,6 +94,14 @@ struct Delivery {
 };
 std::vector<std::uint8_t> encode_delivery(const Delivery& delivery);
 Result<Delivery> decode_delivery(std::span<const std::uint8_t> bytes);
+
+/// A node has seen the forging come to rest, and asks for an observation.
+struct Rest {
+  std::string camera_id;
+  std::int64_t time_ns = 0;  ///< of the look that saw it, by the node's clock
+};
+std::vector<std::uint8_t> encode_rest(const Rest& rest);
+Result<Rest> decode_rest(std::span<const std::uint8_t> bytes);
 
 /// Fusion asks a node for its time.
 struct ClockQuestion {

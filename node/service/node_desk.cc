@@ -72,6 +72,11 @@ Result<std::unique_ptr<NodeDesk>> NodeDesk::open(Transport& transport, const Key
        {keys.service(id, "log"), log_document},
        {keys.service(id, "crop"),
         [self](const Parameters& parameters, const Bytes&) { return self->frame_.crop(parameters); }},
+       {keys.service(id, "firmware"), [self](const Parameters&, const Bytes&) { return self->board_.status(); }},
+       {keys.service(id, "update"),
+        [self](const Parameters&, const Bytes& payload) {
+          return self->board_.want(std::string(payload.begin(), payload.end()));
+        }},
        {keys.service(id, "bundle"), [self](const Parameters&, const Bytes&) { return self->bundle(); }}});
   if (!desk) return pass_on(desk.error());
   self->desk_ = std::move(*desk);

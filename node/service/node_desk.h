@@ -11,13 +11,14 @@
 #include "lib/service/document_desk.h"
 #include "lib/wire/keys.h"
 #include "node/node_config.h"
+#include "node/service/board_update.h"
 #include "node/service/last_frame.h"
 #include "node/service/remote_settings.h"
 
 namespace imprint {
 
 /// What a person may ask of a node from afar, `cam/<id>/service/...`: `config` (the settings in force), `configure`
-/// (others, checked, then on trial with the node's next start), `log`, `crop` of the last frame, `bundle` (all of it
+/// (others, checked, then on trial with the node's next start), `firmware` (the board's image) and `update` (another one), `log`, `crop` of the last frame, `bundle` (all of it
 /// for whoever helps). Documents in pieces, one thread, below everything that measures.
 class NodeDesk {
  public:
@@ -46,6 +47,7 @@ class NodeDesk {
       : node_(std::move(node)),
         settings_(settings),
         frame_(frame),
+        board_(node_.config.data_dir),
         fusion_seen_(std::make_shared<std::atomic<bool>>(false)) {}
 
   Result<Bytes> config_document();
@@ -56,6 +58,7 @@ class NodeDesk {
   std::mutex settings_mutex_;
   RemoteSettings& settings_;
   const LastFrame& frame_;
+  BoardUpdate board_;
   std::shared_ptr<std::atomic<bool>> fusion_seen_;
   std::atomic<bool> restart_wanted_ = false;
   std::unique_ptr<Declaration> fusion_watch_;

@@ -13,7 +13,7 @@ segmentation  300 frames with a forging and 200 empty halls: found, said to have
           Takes --frames N --halls N --first I --seed S --only KIND --save DIR.
 silhouettes  tables 2 to 7 of paper C on rendered scenes, all seven methods; only when asked for.
           Takes --only NAME --seed S --of N --keep DIR.
-multiview tables 2 to 4 and figure 17 of paper D on exactly known forgings, then on rendered ones; only when asked for.
+multiview tables 1 to 4 and figure 17 of paper D on exactly known forgings, then on rendered ones; only when asked for.
 clutter   200 frames of 4 megapixels without targets: what is claimed to be one; only when asked for.
 """
 import argparse
@@ -100,12 +100,20 @@ def part_of(session, observations, cameras):
     return part
 
 
+def forge_with(scene, **keys):
+    """Writes the forge scene with other values of some of its keys."""
+    text = (SCENES / "forge.toml").read_text(encoding="utf-8")
+    for key, value in keys.items():
+        text, found = re.subn(rf"^{key} = .*", f"{key} = {value}", text, flags=re.MULTILINE)
+        if found != 1:
+            sys.exit(f"forge.toml: {key} stands there {found} times, once expected")
+    scene.write_text(text, encoding="utf-8")
+
+
 def bench_rendered_multiview(folder, options):
     cameras = ("cam1", "cam2", "cam3")
     scene = folder.parent / "forge12.toml"
-    turns = ", ".join(f"{30.0 * k}" for k in range(12))
-    scene.write_text(re.sub(r"rotations_deg = \[.*\]", f"rotations_deg = [{turns}]",
-                            (SCENES / "forge.toml").read_text(encoding="utf-8")), encoding="utf-8")
+    forge_with(scene, rotations_deg=[30.0 * k for k in range(12)])
     for seed in range(options.first_seed, options.first_seed + options.seeds):
         shutil.rmtree(folder, ignore_errors=True)
         run(IMPRINT, "simulate", scene, "--seed", seed, "--jobs", 2, "--out", folder)
@@ -116,6 +124,37 @@ def bench_rendered_multiview(folder, options):
                 report = json.loads(run(IMPRINT, "report", folder / "result.json", "--truth", folder / "truth.json", "--json"))
                 values = {**report["against_truth"], "length_error_mm": report["length_error_mm"]}
                 print_row(f"{geometry}, {len(seen_by)} cam.", observations, str(seed), values)
+
+
+def print_widths(name, observations, seed, result, truth):
+    """Widths across faces beside the truth's, in the order of their size."""
+    errors, held = [], []
+    for section in result["sections"]:
+        nearest = min(truth["sections"], key=lambda true, at=section["s_mm"]: abs(true["s_mm"] - at))
+        measured = sorted(section["facets"]["widths_mm"], key=lambda width: width["value"])
+        for width, true in zip(measured, sorted(nearest["widths_mm"]), strict=True):
+            errors.append(width["value"] - true)
+            held.append(abs(errors[-1]) <= width["ci95"])
+    print(f"{name:<10} {observations} obs  seed {seed:>5}: taken for {result['section']}, widths RMS "
+          f"{statistics.fmean(error * error for error in errors) ** 0.5:.3f} mm (goal 0.3), mean {statistics.fmean(errors):+.3f} mm, "
+          f"worst {max(map(abs, errors)):.3f} mm, 95 % intervals hold {100 * statistics.fmean(held):.0f} %", flush=True)
+
+
+def bench_rendered_bars(folder, options):
+    """Bars of 300 mm across faces, six observations at 30 degrees, their kind not told."""
+    scene = folder.parent / "bar.toml"
+    for name, faces in (("square", 4), ("octagon", 8)):
+        forge_with(scene, rotations_deg=[30.0 * k for k in range(6)], stations=f"[[0.0, 300.0]]\nfaces = {faces}",
+                   circularity_mm=0.0, press_marks=0, diameter_mm=[150.0, 450.0])
+        for seed in range(options.first_seed, options.first_seed + options.seeds):
+            shutil.rmtree(folder, ignore_errors=True)
+            run(IMPRINT, "simulate", scene, "--seed", seed, "--jobs", 2, "--out", folder)
+            run(IMPRINT, "measure", folder / "session.toml", "--out", folder / "result.json")
+            result, truth = (json.loads((folder / file).read_text(encoding="utf-8")) for file in ("result.json", "truth.json"))
+            if result["section"] != name:
+                print(f"{name:<10} 6 obs  seed {seed:>5}: taken for {result['section']}")
+                continue
+            print_widths(name, 6, seed, result, truth)
 
 
 def main():
@@ -140,6 +179,8 @@ def main():
         with tempfile.TemporaryDirectory(prefix="imprint-bench-") as folder:
             print("\nRendered, the thesis's estimators with its own edge filter (orientation):")
             bench_rendered_multiview(pathlib.Path(folder) / "session", options)
+            print("\nRendered bars with faces:")
+            bench_rendered_bars(pathlib.Path(folder) / "session", options)
         return
     for name, bench in (("stages", bench_stages), ("latency", bench_latency), ("accuracy", bench_accuracy)):
         if options.name in (None, name):

@@ -207,6 +207,34 @@ class LiveLineTest(unittest.TestCase):
             health = line.wait_for(lambda status: status["cameras"][2]["health"]["failed_frames"] == 1, "health of cam3")
             self.assertEqual(health["cameras"][0]["health"]["failed_frames"], 0)
 
+    def test_camera_that_sees_the_forging_come_to_rest_makes_all_fire(self):
+        images = pathlib.Path(tempfile.mkdtemp(dir=work))
+        for picture in data.glob("obs0[01]_cam[123].png"):
+            if "cam1" not in picture.name:
+                shutil.copy(picture, images)
+        with Line(images=images) as line:
+            line.start_fusion("--set", "rest.accept=true", "--set", "rest.observations=2",
+                              "--set", "rest.quiet_s=1")  # the next forging comes sooner than by a press
+            line.start_nodes("cam1", rest__trigger="true", rest__hold_s=0.5, rest__period_ms=100)
+            line.start_nodes("cam2", "cam3")
+            line.wait_alive("cam1", "cam2", "cam3")
+            time.sleep(2 * SANITIZED_FACTOR)  # nothing in view of cam1: nothing to come to rest
+            self.assertEqual(line.stored("SELECT count(*) FROM message"), [(0,)])
+            for observation in (0, 1):
+                name = f"obs{observation:02}_cam1.png"
+                shutil.copy(data / name, images / "coming.png")
+                (images / "coming.png").rename(images / name)
+                status = line.wait_for(lambda status: status["last_result"] and len(status["session"]["observations"]) == observation + 1
+                                       and not status["session"]["observations"][observation]["waiting"], "observed by itself")
+                self.assertTrue(status["session"]["session"].startswith("rest-"), status["session"])
+            line.wait_for(lambda status: status["last_result"]["complete"], "both observations")
+            result = line.result("latest")["result"]
+            self.assertEqual([o["rotation_deg"] for o in result["observations"]], [0.0, 60.0])
+            self.assertFalse(any(camera["excluded"] for o in result["observations"] for camera in o["cameras"]), result["warnings"])
+            self.assertFalse(any(" apart" in warning for warning in result["warnings"]), result["warnings"])
+            time.sleep(2 * SANITIZED_FACTOR)  # it rests on: once is enough
+            self.assertEqual(line.stored("SELECT count(*) FROM message WHERE camera IS NULL"), [(2,)])
+
     def test_no_fusion_no_trigger(self):
         begin = time.monotonic()
         done = imprint("trigger", "--connect", f"tcp/127.0.0.1:{free_port()}", "--session", "S", "--wait", 60)

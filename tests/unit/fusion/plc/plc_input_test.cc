@@ -39,9 +39,9 @@ TEST_CASE("plc: an input that is high from the start has not risen") {
 }
 
 TEST_CASE("plc: edges count through a session, the next one begins after the last or after a long pause") {
-  PlcConfig config;
-  config.observations = 2;
-  PlcSessions sessions(config);
+  SessionPlan plan{.session = "plc"};
+  plan.observations = 2;
+  TriggerSessions sessions(plan);
   const Trigger first = sessions.next(at(0), 0);
   REQUIRE(first.session == "plc-19700101T000000.000");
   REQUIRE(check_id("session", first.session));

@@ -78,6 +78,23 @@ TEST_CASE("board: what a camera says of its exposure is an alarm until it no lon
   REQUIRE_FALSE(line.has_alarm());
 }
 
+TEST_CASE("board: a camera that gives no frames is an alarm until frames come") {
+  LineBoard line({"plant", "L1", "best", "0.1.0"}, {"cam1", "cam2"}, kStart);
+  Health health;
+  health.camera_id = "cam1";
+  health.capture_fault = "/dev/video0: lost: No such device";
+  health.dropped_frames = 7;
+  line.set_health(health, kStart);
+  const auto status = line.status(kStart);
+  REQUIRE(status["alarms"].size() == 1);
+  REQUIRE(status["alarms"][0]["name"] == "capture_cam1");
+  REQUIRE(status["alarms"][0]["text"] == "camera cam1: /dev/video0: lost: No such device");
+  REQUIRE(status["cameras"][0]["health"]["dropped_frames"] == 7);
+  health.capture_fault.clear();
+  line.set_health(health, kStart);
+  REQUIRE_FALSE(line.has_alarm());
+}
+
 Health health_of(std::uint64_t boot_id, std::int64_t sent_s) {
   Health health;
   health.camera_id = "cam1";

@@ -37,8 +37,9 @@ TEST_CASE("fusion config: the rig is enough; it routes on this machine only and 
 
 TEST_CASE("fusion config: what is printed reads back as the same config") {
   const TemporaryFolder folder;
-  const auto config =
-      read(folder, "[fusion]\nrig = \"rig.toml\"\nresult_dir = \"out\"\ndeadline_s = 2.5\n[page]\nport = 0\n");
+  const auto config = read(folder,
+                           "[fusion]\nrig = \"rig.toml\"\nresult_dir = \"out\"\ndeadline_s = 2.5\n[page]\nport = 0\n"
+                           "[rest]\naccept = true\nobservations = 3\nlead_ms = 250.0\n");
   REQUIRE(config);
   const auto again = read(folder, to_toml(*config));
   REQUIRE(again);
@@ -46,6 +47,9 @@ TEST_CASE("fusion config: what is printed reads back as the same config") {
   REQUIRE(again->assembler.deadline_s == 2.5);
   REQUIRE(again->result_dir == folder / "out");
   REQUIRE(again->geometry == GeometryMethod::joint);
+  REQUIRE(again->rest.accept);
+  REQUIRE(again->rest.plan.observations == 3);
+  REQUIRE(again->rest.lead_ms == 250.0);
 }
 
 TEST_CASE("fusion config: a fault names the file, the line and the key") {
@@ -60,6 +64,8 @@ TEST_CASE("fusion config: a fault names the file, the line and the key") {
   REQUIRE(
       fault("[fusion]\nrig = \"r\"\ngeometry = \"middle\"\n").find("fusion.geometry: expected one of joint, thesis") !=
       std::string::npos);
+  REQUIRE(fault("[fusion]\nrig = \"r\"\n[rest]\nobservations = 0\n").find("observations: expected 1 to 64") !=
+          std::string::npos);
   REQUIRE(fault("rig = \"r\"\n").find("unknown key") != std::string::npos);
   REQUIRE(fault("[fusion]\nrig = \"r\"\n[zenoh]\nlisten = [7447]\n").find("zenoh.listen: expected a list of texts") !=
           std::string::npos);

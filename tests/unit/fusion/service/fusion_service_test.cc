@@ -415,4 +415,39 @@ TEST_CASE("fusion: it answers what a session's result is, and that there is none
   REQUIRE(document["result"]["length_mm"] == 1.0);
 }
 
+TEST_CASE("fusion: a camera's word that the forging rests fires all cameras at one moment, two cameras' once") {
+  Plant plant;
+  const auto say = [&](const std::string& camera) {
+    auto publisher = *plant.outside->publish(plant.keys.rest(camera), {.traffic = Traffic::command});
+    REQUIRE(publisher->put(encode_rest({camera, wall_clock_ns()})));
+  };
+  const auto fired = [&] {
+    const std::lock_guard lock(plant.mutex);
+    return plant.seen_triggers;
+  };
+  say("cam1");
+  std::this_thread::sleep_for(200ms);
+  REQUIRE(fired().empty());  // off by default
+  plant.stop();
+  plant.config.rest.accept = true;
+  plant.config.rest.plan.observations = 2;
+  plant.config.rest.quiet_s = 0.5;
+  plant.start();
+  const std::int64_t before_ns = wall_clock_ns();
+  say("cam9");  // of no rig
+  say("cam1");
+  say("cam2");
+  REQUIRE(eventually([&] { return fired().size() == 1; }));
+  std::this_thread::sleep_for(600ms);
+  say("cam2");
+  REQUIRE(eventually([&] { return fired().size() == 2; }));
+  const auto triggers = fired();
+  REQUIRE(triggers[0].session.starts_with("rest-"));
+  REQUIRE(triggers[0].fire_at_ns >= before_ns + 300'000'000);
+  REQUIRE(triggers[0].observations_expected == 2);
+  REQUIRE(triggers[1].session == triggers[0].session);
+  REQUIRE(triggers[1].observation == 1);
+  REQUIRE(triggers[1].rotation_deg == 60.0);
+}
+
 }  // namespace imprint

@@ -67,7 +67,7 @@ TEST_CASE("systemd notice: the watchdog is due twice in the time that the unit a
 TEST_CASE("systemd notice: a loop that has not turned since lets the watchdog run out, one that turns again does not") {
   const Systemd systemd;
   std::uint64_t turns = 0;
-  LoopWatchdog watchdog([&] { return turns; });
+  LoopWatchdog watchdog({[&] { return turns; }});
   REQUIRE(watchdog.attend());
   REQUIRE(systemd.heard() == "WATCHDOG=1");
   REQUIRE_FALSE(watchdog.attend());
@@ -76,6 +76,18 @@ TEST_CASE("systemd notice: a loop that has not turned since lets the watchdog ru
   turns += 3;
   REQUIRE(watchdog.attend());
   REQUIRE(systemd.heard() == "WATCHDOG=1");
+}
+
+TEST_CASE("systemd notice: of two loops each must turn") {
+  const Systemd systemd;
+  std::uint64_t one = 0;
+  std::uint64_t other = 0;
+  LoopWatchdog watchdog({[&] { return one; }, [&] { return other; }});
+  REQUIRE(watchdog.attend());
+  ++one;
+  REQUIRE_FALSE(watchdog.attend());
+  ++other;
+  REQUIRE(watchdog.attend());
 }
 
 }  // namespace imprint

@@ -77,7 +77,7 @@ TEST_CASE("health message: a long error is cut to 80 bytes") {
   CHECK(got->last_error == std::string(77, 'e') + "...");
 }
 
-TEST_CASE("receipt and delivery messages: come back whole, long reasons cut") {
+TEST_CASE("receipt, delivery and rest messages: come back whole, long reasons cut") {
   const Receipt receipt{"cam1", 0xFEDCBA9876543210, 12, std::string(300, 'r')};
   const auto confirmed = decode_receipt(encode_receipt(receipt));
   REQUIRE(confirmed);
@@ -98,6 +98,11 @@ TEST_CASE("receipt and delivery messages: come back whole, long reasons cut") {
   CHECK(told->discarded == 1);
   CHECK(told->refused == 2);
   CHECK(told->fault == "no space left");
+  const auto rest = decode_rest(encode_rest({"cam1", 123'456'789'012}));
+  REQUIRE(rest);
+  CHECK(rest->camera_id == "cam1");
+  CHECK(rest->time_ns == 123'456'789'012);
+  CHECK_FALSE(decode_rest(encode_rest({"no id", 0})));
   CHECK_FALSE(decode_receipt(std::vector<std::uint8_t>{0x10}));
   CHECK_FALSE(decode_delivery(encode_delivery({"no id", 0, 0, 0, 0, 0, 0, 0, 0, ""})));
 }
@@ -111,6 +116,19 @@ TEST_CASE("health message: an alarm of the exposure comes back, what is not fini
   REQUIRE(got);
   CHECK(got->exposure_alarm == sent.exposure_alarm);
   CHECK(got->haze_px == 0.0);
+}
+
+TEST_CASE("health message: what a camera lost and why comes back") {
+  Health sent;
+  sent.camera_id = "cam1";
+  sent.dropped_frames = 1'000'000'000'000;
+  sent.capture_restarts = 3;
+  sent.capture_fault = "/dev/video0: lost: No such device";
+  const auto got = decode_health(encode_health(sent));
+  REQUIRE(got);
+  CHECK(got->dropped_frames == sent.dropped_frames);
+  CHECK(got->capture_restarts == 3);
+  CHECK(got->capture_fault == sent.capture_fault);
 }
 
 TEST_CASE("result message: comes back whole") {

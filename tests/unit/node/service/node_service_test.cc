@@ -32,6 +32,8 @@ class FakeSource final : public FrameSource, public AdjustableExposure {
     exposure_ = exposure;
     return {};
   }
+  [[nodiscard]] std::optional<CaptureStatus> status() const override { return capture_status; }
+  std::optional<CaptureStatus> capture_status;
   bool adjustable = false, refuses = false;
   int failing_observation = -1;
   std::atomic<int> captures = 0;
@@ -68,16 +70,26 @@ struct Line {
     REQUIRE(triggers->put(encode_trigger({"S", observation, 30.0 * observation, fire_at_ns, 3})));
   }
 
-  std::vector<Imprint> wait_for_imprints(std::size_t count) {
+  std::vector<Health> wait_for_healths(std::size_t count) {
+    auto found = wait_for(healths, count);
+    REQUIRE(found.size() >= count);
+    return found;
+  }
+  std::vector<Imprint> wait_for_imprints(std::size_t count) { return wait_for(imprints, count); }
+
+ private:
+  // Those that have come, as soon as they are so many, or after five seconds.
+  template <class Message>
+  std::vector<Message> wait_for(const std::vector<Message>& messages, std::size_t count) {
     for (int i = 0; i < 500; ++i) {
       {
         const std::lock_guard lock(mutex);
-        if (imprints.size() >= count) return imprints;
+        if (messages.size() >= count) return messages;
       }
       std::this_thread::sleep_for(10ms);
     }
     const std::lock_guard lock(mutex);
-    return imprints;
+    return messages;
   }
 };
 
@@ -230,8 +242,7 @@ ExposureRun expose(Line& line, const NodeConfig& config, double level, std::uint
   auto imprints = line.wait_for_imprints(frames);
   REQUIRE(imprints.size() == frames);
   node.stop();
-  const std::lock_guard lock(line.mutex);
-  return {std::move(imprints), line.healths.back()};
+  return {std::move(imprints), line.wait_for_healths(frames + 1).back()};  // the bus delivers on a thread of its own
 }
 
 TEST_CASE("node: a body that saturates is exposed less the next time; where that is at its end, health says so") {
@@ -329,6 +340,34 @@ TEST_CASE("node: it stops at once while it waits for a trigger's moment, and mal
   REQUIRE(line.source.captures == 0);
 }
 
+TEST_CASE("node: what it says of itself is good until a frame shows no targets or its camera is lost") {
+  Line line;
+  line.source.failing_observation = 1;
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  CHECK(node.condition() == "good: no trigger yet");
+  line.fire(0);
+  REQUIRE(line.wait_for_imprints(1).size() == 1);
+  line.wait_for_healths(2);
+  CHECK(node.condition() == "good: 17 targets in the last of 1 frames");
+  line.fire(1);
+  REQUIRE(line.wait_for_imprints(2).size() == 2);
+  line.wait_for_healths(3);
+  CHECK(node.condition() == "no targets in the last frame: the lens cap is on");
+}
+
+TEST_CASE("node: what its camera lost, and why it gives no frames, is in health") {
+  Line line;
+  line.source.capture_status = CaptureStatus{10, 3, 2, "/dev/video0: lost: No such device"};
+  NodeService node(config(), line.source, seen, *line.node_side);
+  REQUIRE(node.start());
+  const Health health = line.wait_for_healths(1).back();
+  CHECK(health.dropped_frames == 3);
+  CHECK(health.capture_restarts == 2);
+  CHECK(health.capture_fault == "/dev/video0: lost: No such device");
+  CHECK(node.condition() == "no frames: /dev/video0: lost: No such device");
+}
+
 TEST_CASE("node: its token is there while it runs and gone when it has stopped") {
   Line line;
   std::mutex mutex;
@@ -346,6 +385,45 @@ TEST_CASE("node: its token is there while it runs and gone when it has stopped")
   const std::lock_guard lock(mutex);
   REQUIRE(changes ==
           std::vector<std::pair<std::string, bool>>{{line.keys.alive("cam1"), true}, {line.keys.alive("cam1"), false}});
+}
+
+TEST_CASE("node: a forging that comes to rest is told to fusion once; triggers are answered meanwhile") {
+  Line line;
+  std::atomic<int> told = 0;
+  line.declarations.push_back(*line.fusion_side->subscribe(line.keys.rest(), {}, [&](const Sample& sample) {
+    const auto rest = decode_rest(sample.payload);
+    if (rest && rest->camera_id == "cam1" && line.keys.camera_of(sample.key) == "cam1") ++told;
+  }));
+  std::atomic<bool> there = false;
+  const auto see = [&](const Frame& /*frame*/) -> std::optional<Segmentation> {
+    if (!there) return std::nullopt;
+    Segmentation forging;
+    forging.upper_offset_px.assign(600, -80.0F);
+    forging.lower_offset_px.assign(600, 80.0F);
+    return forging;
+  };
+  NodeConfig watching = config();
+  watching.rest = {.trigger = true, .period_ms = 20.0, .max_motion_px = 2.0, .hold_s = 0.1, .rearm_px = 12.0};
+  NodeService node(watching, line.source, seen, *line.node_side, see);
+  REQUIRE(node.start());
+  std::this_thread::sleep_for(300ms);
+  REQUIRE(line.source.captures > 2);
+  REQUIRE(told == 0);  // an empty hall rests, but there is nothing to measure
+  there = true;
+  for (int i = 0; i < 500 && told == 0; ++i) std::this_thread::sleep_for(10ms);
+  line.fire(0);
+  REQUIRE(line.wait_for_imprints(1).size() == 1);
+  std::this_thread::sleep_for(300ms);
+  REQUIRE(told == 1);
+}
+
+TEST_CASE("node: without rest.trigger no frame is taken but when triggered") {
+  Line line;
+  NodeService node(config(), line.source, seen, *line.node_side,
+                   [](const Frame& /*frame*/) { return std::optional<Segmentation>(); });
+  REQUIRE(node.start());
+  std::this_thread::sleep_for(200ms);
+  REQUIRE(line.source.captures == 0);
 }
 
 }  // namespace imprint
