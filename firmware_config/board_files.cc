@@ -45,6 +45,10 @@ std::string sysctl_file(const BoardConfig& config) {
 
 std::string udev_file(const BoardConfig& config) {
   std::string text = kMade;
+  if (config.camera_source == "libcamera")
+    text +=
+        "SUBSYSTEM==\"media\", GROUP=\"video\", MODE=\"0660\"\n"
+        "SUBSYSTEM==\"dma_heap\", GROUP=\"video\", MODE=\"0660\"\n";
   if (!config.camera_usb_id.empty()) {
     const std::string vendor = config.camera_usb_id.substr(0, 4);
     const std::string product = config.camera_usb_id.substr(5);
@@ -94,6 +98,7 @@ std::string unit_file(const BoardConfig& config) {
   std::string text = fmt::format("{}[Service]\nMemoryMax={}M\n", kMade, config.memory_max_mb);
   if (config.camera_source == "v4l2" || config.camera_source == "libcamera")
     text += "DeviceAllow=char-video4linux rw\nDeviceAllow=char-media rw\n";
+  if (config.camera_source == "libcamera") text += "DeviceAllow=char-dma_heap rw\n";  // its buffers
   if (config.camera_source == "aravis") text += "DeviceAllow=char-usb_device rw\n";
   return text;
 }

@@ -4,7 +4,6 @@ namespace imprint {
 namespace {
 
 constexpr int kMaxSide = 65'535;
-constexpr int kBuffersOfTheDriver = 2;  // one being filled, one next
 
 }  // namespace
 

@@ -25,6 +25,9 @@ struct CameraControl {
   std::string value;
 };
 
+/// Of a camera's buffers those that cannot keep a recent frame: one being filled, one next.
+inline constexpr int kBuffersOfTheDriver = 2;
+
 /// How a camera is to be set; `[camera]` of node.toml.
 struct CameraSettings {
   std::string device;  // v4l2: a path; aravis, libcamera: its id; empty: the only one there is

@@ -11,6 +11,9 @@
 #ifdef IMPRINT_ARAVIS
 #include "node/capture/aravis_stream.h"
 #endif
+#ifdef IMPRINT_LIBCAMERA
+#include "node/capture/libcamera_stream.h"
+#endif
 
 namespace imprint {
 namespace {
@@ -26,6 +29,9 @@ constexpr auto kDrivers = std::to_array<Driver>({
     {"v4l2", [](const CameraSettings& settings) { return open_v4l2_stream(settings); }},
 #ifdef IMPRINT_ARAVIS
     {"aravis", [](const CameraSettings& settings) { return open_aravis_stream(settings); }},
+#endif
+#ifdef IMPRINT_LIBCAMERA
+    {"libcamera", [](const CameraSettings& settings) { return open_libcamera_stream(settings); }},
 #endif
 });
 

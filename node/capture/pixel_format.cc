@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include <opencv2/imgproc.hpp>
+
 namespace imprint {
 namespace {
 
@@ -72,10 +74,19 @@ UnpackRow row_unpacker(PixelFormat format) {
     case PixelFormat::mono12_gev:
       return unpack_row<PixelFormat::mono12_gev>;
     case PixelFormat::mono8:
+    case PixelFormat::rgb8:
+    case PixelFormat::bgr8:
     case PixelFormat::mono16:
       break;
   }
   return unpack_row<PixelFormat::mono16>;
+}
+
+cv::Mat luminance(const PixelLayout& layout, const std::uint8_t* pixels, std::size_t stride) {
+  const cv::Mat colour(layout.height_px, layout.width_px, CV_8UC3, const_cast<std::uint8_t*>(pixels), stride);
+  cv::Mat grey;
+  cv::cvtColor(colour, grey, layout.format == PixelFormat::rgb8 ? cv::COLOR_RGB2GRAY : cv::COLOR_BGR2GRAY);
+  return grey;
 }
 
 }  // namespace
@@ -104,6 +115,9 @@ std::size_t row_bytes(PixelFormat format, int width_px) {
       return (10 * width + 7) / 8;
     case PixelFormat::mono12_pfnc:
       return (12 * width + 7) / 8;
+    case PixelFormat::rgb8:
+    case PixelFormat::bgr8:
+      return 3 * width;
     case PixelFormat::mono10:
     case PixelFormat::mono12:
     case PixelFormat::mono16:
@@ -122,6 +136,8 @@ Result<cv::Mat> unpack(const PixelLayout& layout, std::span<const std::uint8_t> 
   if (buffer.size() < needed)
     return job_failed("{} bytes came, {} x {} px {} take {}", buffer.size(), layout.width_px, layout.height_px,
                       name_of(layout.format), needed);
+  if (layout.format == PixelFormat::rgb8 || layout.format == PixelFormat::bgr8)
+    return luminance(layout, buffer.data(), stride);
   cv::Mat image(layout.height_px, layout.width_px, layout.format == PixelFormat::mono8 ? CV_8UC1 : CV_16UC1);
   for (std::size_t y = 0; y < height; ++y) {
     const std::uint8_t* from = buffer.data() + y * stride;

@@ -24,6 +24,8 @@ enum class PixelFormat {
   mono10_pfnc,  ///< four pixels in 5 bytes, low bits first (GenICam Mono10p)
   mono12_pfnc,  ///< two pixels in 3 bytes, low bits first (GenICam Mono12p)
   mono12_gev,   ///< two pixels in 3 bytes as GigE Vision 1 has them (Mono12Packed)
+  rgb8,         ///< colour in 3 bytes a pixel, as they lie in memory; the luminance (Rec. 601) is taken
+  bgr8,
 };
 
 struct FormatName {
@@ -42,6 +44,8 @@ inline constexpr auto kPixelFormats = std::to_array<FormatName>({
     {PixelFormat::mono10_pfnc, "mono10_pfnc", 10},
     {PixelFormat::mono12_pfnc, "mono12_pfnc", 12},
     {PixelFormat::mono12_gev, "mono12_gev", 12},
+    {PixelFormat::rgb8, "rgb8", 8},
+    {PixelFormat::bgr8, "bgr8", 8},
 });
 
 std::string_view name_of(PixelFormat format);
@@ -59,8 +63,9 @@ struct PixelLayout {
 /// Bytes of one row without what may follow it.
 std::size_t row_bytes(PixelFormat format, int width_px);
 
-/// The picture in a buffer of its own: 8 bit for mono8, else 16 bit with the values spread over all 16, so that full
-/// scale is 65535 whatever the sensor's depth. Fails (job_failed) when the buffer is too short for the layout.
+/// The picture in a buffer of its own: 8 bit for mono8 and colour, else 16 bit with the values spread over all 16, so
+/// that full scale is 65535 whatever the sensor's depth. Fails (job_failed) when the buffer is too short for the
+/// layout.
 Result<cv::Mat> unpack(const PixelLayout& layout, std::span<const std::uint8_t> buffer);
 
 }  // namespace imprint

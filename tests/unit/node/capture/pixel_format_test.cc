@@ -43,6 +43,10 @@ std::vector<std::uint8_t> pack(PixelFormat format, const std::vector<unsigned>& 
         set_bits(24 * (i / 2) + 16 * (i % 2), value >> 4U, 8);
         set_bits(24 * (i / 2) + 8 + 4 * (i % 2), value & 15U, 4);
         break;
+      case PixelFormat::rgb8:  // grey: three times the same
+      case PixelFormat::bgr8:
+        for (const std::size_t channel : {0U, 1U, 2U}) set_bits(24 * i + 8 * channel, value, 8);
+        break;
     }
   }
   return bytes;
@@ -59,8 +63,8 @@ TEST_CASE("pixels: every format gives each value back at its place, full scale a
     values.push_back(highest);
     const auto image = unpack({entry.format, 7, 1, 0}, pack(entry.format, values));
     REQUIRE(image);
-    const double full = entry.format == PixelFormat::mono8 ? 255.0 : 65535.0;
-    REQUIRE(image->depth() == (entry.format == PixelFormat::mono8 ? CV_8U : CV_16U));
+    const double full = entry.bits == 8 ? 255.0 : 65535.0;
+    REQUIRE(image->type() == (entry.bits == 8 ? CV_8UC1 : CV_16UC1));
     for (int x = 0; x < 7; ++x) {
       const double found = image->depth() == CV_8U ? image->at<std::uint8_t>(0, x) : image->at<std::uint16_t>(0, x);
       // Spreading 10 or 12 bits over 16 by repeating the high ones is off the straight line by less than one.
@@ -92,7 +96,18 @@ TEST_CASE("pixels: names lead back to their formats, another name lists them") {
   REQUIRE_FALSE(refused);
   CHECK(refused.error().message ==
         "pixel format \"bayer\": expected one of mono8, mono10, mono12, mono16, mono10_mipi, mono12_mipi, "
-        "mono10_pfnc, mono12_pfnc, mono12_gev");
+        "mono10_pfnc, mono12_pfnc, mono12_gev, rgb8, bgr8");
+}
+
+TEST_CASE("pixels: the luminance of colour is that of Rec. 601, red first or blue first") {
+  const std::vector<std::uint8_t> bytes{255, 0, 0, 0, 255, 0, 99, 0, 0, 255, 255, 255, 255};  // rows of 7 bytes
+  const cv::Mat_<std::uint8_t> red_first = (cv::Mat_<std::uint8_t>(2, 2) << 76, 150, 29, 255);
+  const cv::Mat_<std::uint8_t> blue_first = (cv::Mat_<std::uint8_t>(2, 2) << 29, 150, 76, 255);
+  for (const auto& [format, expected] : {std::pair{PixelFormat::rgb8, red_first}, {PixelFormat::bgr8, blue_first}}) {
+    const auto image = unpack({format, 2, 2, 7}, bytes);
+    REQUIRE(image);
+    CHECK(cv::norm(*image, expected, cv::NORM_INF) == 0.0);
+  }
 }
 
 }  // namespace imprint
