@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "fusion/history/history_copy.h"
 #include "lib/daemon/program.h"
 
 namespace imprint {
@@ -106,6 +107,7 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
              "fusion.method",
              "fusion.geometry",
              "fusion.log_level",
+             "history.postgresql",
              "zenoh.connect",
              "zenoh.listen",
              "zenoh.identity",
@@ -141,6 +143,11 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
   config.rig = read.path("fusion.rig");
   config.database = read.path("fusion.database", std::filesystem::absolute(path).parent_path() / config.database);
   config.result_dir = read.path("fusion.result_dir", config.result_dir);
+  config.postgresql = read.string("history.postgresql", config.postgresql);
+  if (!config.postgresql.empty()) {
+    if (const auto valid = check_postgres(config.postgresql); !valid)
+      read.fault("history.postgresql", valid.error().message);
+  }
   config.assembler.deadline_s = read.number("fusion.deadline_s", config.assembler.deadline_s);
   config.assembler.max_spread_s = read.number("fusion.max_spread_s", config.assembler.max_spread_s);
   config.assembler.max_clock_offset_s = read.number("fusion.max_clock_offset_s", config.assembler.max_clock_offset_s);
@@ -181,14 +188,16 @@ Result<FusionConfig> read_fusion_config(const std::filesystem::path& path, const
 std::string to_toml(const FusionConfig& config) {
   return fmt::format(
       "[fusion]\nsite = {}\nline = {}\nrig = {}\ndatabase = {}\n{}{}deadline_s = {}\nmax_spread_s = {}\n"
-      "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n"
+      "max_clock_offset_s = {}\nmethod = {}\ngeometry = {}\nlog_level = {}\n\n{}"
       "[zenoh]\n{}{}\n[page]\naddress = {}\nport = {}\n{}insecure = {}\naudit = {}\n\n{}",
       toml_text(config.site), toml_text(config.line), toml_text(config.rig.string()),
       toml_text(config.database.string()),
       config.result_dir.empty() ? "" : fmt::format("result_dir = {}\n", toml_text(config.result_dir.string())),
       lines_to_toml(config.lines), toml_number(config.assembler.deadline_s), toml_number(config.assembler.max_spread_s),
       toml_number(config.assembler.max_clock_offset_s), toml_text(config.method), toml_text(name_of(config.geometry)),
-      toml_text(config.log_level), zenoh_to_toml(config.zenoh),
+      toml_text(config.log_level),
+      config.postgresql.empty() ? "" : fmt::format("[history]\npostgresql = {}\n\n", toml_text(config.postgresql)),
+      zenoh_to_toml(config.zenoh),
       config.access.empty() ? "" : fmt::format("access = {}\n", toml_text(config.access.string())),
       toml_text(config.page.address), config.page.port,
       config.page.users.empty() ? "" : fmt::format("users = {}\n", toml_text(config.page.users.string())),

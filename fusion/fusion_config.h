@@ -22,6 +22,7 @@ struct FusionConfig {
   std::filesystem::path rig;
   std::filesystem::path database = "imprint.db";
   std::filesystem::path result_dir;          // empty: none
+  std::string postgresql;                    // connection string of a copy of the histories; empty: none
   std::vector<std::filesystem::path> lines;  // fusion.toml of further lines that the same program fuses
   std::string method = "best";
   GeometryMethod geometry = GeometryMethod::joint;

@@ -39,6 +39,9 @@ Result<void> FusionLine::open() {
   for (const CameraModel& camera : rig_.cameras) camera_ids.push_back(camera.id);
   board_ = std::make_unique<LineBoard>(LineBoard::Identity{config_.site, config_.line, config_.method, IMPRINT_VERSION},
                                        camera_ids, std::chrono::steady_clock::now(), config_.alarms);
+  if (!config_.postgresql.empty())
+    history_ = std::make_unique<HistoryExport>(postgres_copy(config_.postgresql), config_.site, config_.line, *store_,
+                                               *board_);
   auto page = PageServer::start(config_.page, *board_, *store_, control_);
   if (!page) return pass_on(page.error());
   page_ = std::move(*page);

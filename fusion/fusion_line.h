@@ -8,6 +8,7 @@
 
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_service.h"
+#include "fusion/history/history_export.h"
 #include "fusion/plc_input.h"
 #include "fusion/serve/line_board.h"
 #include "fusion/serve/line_control.h"
@@ -32,7 +33,7 @@ class FusionLine {
 
   /// Whether `open` would find or could make a store. Changes nothing.
   [[nodiscard]] Result<void> check() const;
-  /// Opens the store, the page and the PLC's input.
+  /// Opens the store, the page and the PLC's input; the copy of the history begins.
   Result<void> open();
   /// Begins to receive and fuse; what `disconnect` ended can begin again on another transport.
   Result<void> connect(Transport& transport);
@@ -51,6 +52,7 @@ class FusionLine {
   Rig rig_;
   std::unique_ptr<SessionStore> store_;
   std::unique_ptr<LineBoard> board_;
+  std::unique_ptr<HistoryExport> history_;
   LineControl control_;
   std::unique_ptr<PageServer> page_;
   std::unique_ptr<PlcInput> plc_;

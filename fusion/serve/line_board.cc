@@ -201,6 +201,11 @@ void LineBoard::set_session(CurrentSession session) {
   session_ = std::move(session);
 }
 
+void LineBoard::set_history(HistoryState history) {
+  const std::lock_guard lock(mutex_);
+  history_ = history;
+}
+
 void LineBoard::set_result(const StoredResult& result) {
   json document = to_json(result);
   if (document["result"].is_object()) document["result"].erase("sections");  // the status stays small
@@ -247,10 +252,17 @@ json LineBoard::status(Time now) const {
                                          {"waiting", state.waiting}});
     }
   }
+  json history;
+  if (history_) {
+    history = {{"connected", history_->connected},
+               {"waiting_messages", history_->waiting_messages},
+               {"waiting_results", history_->waiting_results}};
+  }
   return {{"schema", "imprint.status/1"},  {"site", identity_.site},        {"line", identity_.line},
           {"method", identity_.method},    {"version", identity_.version},  {"uptime_s", age_s(started_, now)},
           {"cameras", std::move(cameras)}, {"session", std::move(session)}, {"last_result", last_result_},
-          {"counters", counters_},         {"alarms", alarms_.standing()},  {"ended_alarms", alarms_.ended()}};
+          {"counters", counters_},         {"alarms", alarms_.standing()},  {"ended_alarms", alarms_.ended()},
+          {"history", std::move(history)}};
 }
 
 json LineBoard::camera_json(const std::string& id, const Camera& camera, Time now) {

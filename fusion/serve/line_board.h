@@ -31,6 +31,13 @@ struct CurrentSession {
   std::vector<ObservationState> observations;
 };
 
+/// The copy of the line's history in another database.
+struct HistoryState {
+  bool connected = false;
+  std::int64_t waiting_messages = 0;  ///< triggers and imprints that are only here
+  std::int64_t waiting_results = 0;   ///< at most so many results
+};
+
 /// What is known of the line at this moment, for whoever asks: the page, `imprint status`. Safe to use from several
 /// threads; knows the clock only for when an alarm began.
 class LineBoard {
@@ -59,6 +66,7 @@ class LineBoard {
   /// What fusion misses between the imprints of a camera that it has: how many, and which sequence numbers.
   void set_missing(const std::string& camera_id, std::uint64_t count, const std::string& numbers);
   void set_session(CurrentSession session);
+  void set_history(HistoryState history);
   void set_result(const StoredResult& result);
   /// Adds to one of the counters of the status document.
   void count(const std::string& counter, std::uint64_t by = 1);
@@ -96,6 +104,7 @@ class LineBoard {
   std::map<std::string, Camera> cameras_;
   std::optional<CurrentSession> session_;
   nlohmann::json last_result_;
+  std::optional<HistoryState> history_;
   std::map<std::string, std::uint64_t> counters_;
   AlarmList alarms_;
   HealthAlarms health_alarms_;

@@ -86,6 +86,13 @@ std::string prometheus_text(const json& status) {
                               alarm.at("acknowledged_by").is_null() ? "no" : "yes"),
                   1);
   }
+  if (const json& history = status.at("history"); history.is_object()) {
+    Family(out, "history_connected", "gauge", "1: PostgreSQL is reached").sample(line, history.at("connected"));
+    Family(out, "history_waiting_messages", "gauge", "not yet in PostgreSQL")
+        .sample(line, history.at("waiting_messages"));
+    Family(out, "history_waiting_results", "gauge", "not yet in PostgreSQL, at most")
+        .sample(line, history.at("waiting_results"));
+  }
   for (const Gauge& gauge : kGauges) {
     Family family(out, gauge.name, "gauge", gauge.help);
     const json::json_pointer pointer(gauge.pointer);

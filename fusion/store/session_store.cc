@@ -5,59 +5,13 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include "fusion/store/schema.h"
 #include "lib/config/file_lock.h"
 
 namespace imprint {
 namespace {
 
-constexpr int kSchemaVersion = 2;
 constexpr int kBusyTimeoutMs = 2000;  // another process reading (a report, a backup) may hold the file for a moment
-
-constexpr const char* kSchema = R"sql(
-CREATE TABLE message (
-  id INTEGER PRIMARY KEY,            -- the order of receipt
-  session TEXT NOT NULL,
-  observation INTEGER NOT NULL,
-  received_ns INTEGER NOT NULL,
-  camera TEXT,                       -- NULL: a trigger
-  boot_id INTEGER,
-  sequence INTEGER,
-  bytes BLOB NOT NULL,
-  late INTEGER NOT NULL DEFAULT 0,   -- an imprint whose observation had been evaluated without it
-  clock_offset_ns INTEGER            -- its node's clock minus ours; NULL: not known
-);
-CREATE INDEX message_session ON message(session, id);
-CREATE UNIQUE INDEX one_imprint ON message(camera, boot_id, sequence) WHERE camera IS NOT NULL;
-CREATE UNIQUE INDEX one_trigger ON message(session, observation, bytes) WHERE camera IS NULL;
-CREATE TABLE result (
-  session TEXT PRIMARY KEY,
-  complete INTEGER NOT NULL,
-  error TEXT NOT NULL,
-  json TEXT NOT NULL,
-  made_ns INTEGER NOT NULL,
-  revision INTEGER NOT NULL UNIQUE,
-  last_message INTEGER NOT NULL      -- newest message of the session when the result was made
-);
-)sql";
-
-// From schema 1, which knew nothing of clocks and of who came late.
-constexpr const char* kFromSchema1 =
-    "ALTER TABLE message ADD COLUMN late INTEGER NOT NULL DEFAULT 0;"
-    "ALTER TABLE message ADD COLUMN clock_offset_ns INTEGER;";
-
-// Whether this program can use the database as it is; its schema's version.
-Result<int> known_version(SQLite::Database& db, const std::filesystem::path& path) {
-  const int version = db.execAndGet("PRAGMA user_version").getInt();
-  if (version > kSchemaVersion) {
-    return invalid_input(
-        "{}: written by a newer imprint-fusion (schema {}, this one knows {}); update it or name another file",
-        path.string(), version, kSchemaVersion);
-  }
-  if (version == 0 && db.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0) {
-    return invalid_input("{}: a database of another program; name another file", path.string());
-  }
-  return version;
-}
 
 StoredResult read_result(const SQLite::Statement& row) {
   StoredResult result;
@@ -72,6 +26,34 @@ StoredResult read_result(const SQLite::Statement& row) {
 
 constexpr const char* kSelectResult = "SELECT session, complete, error, json, made_ns, revision FROM result ";
 
+constexpr const char* kSelectMessage =
+    "SELECT id, session, observation, camera, boot_id, sequence, received_ns, bytes, late, clock_offset_ns "
+    "FROM message ";
+
+std::vector<StoredMessage> read_messages(SQLite::Statement& select) {
+  std::vector<StoredMessage> messages;
+  while (select.executeStep()) {
+    StoredMessage message;
+    message.id = select.getColumn(0).getInt64();
+    message.session = select.getColumn(1).getString();
+    message.observation = select.getColumn(2).getInt64();
+    message.is_trigger = select.isColumnNull(3);
+    if (!message.is_trigger) {
+      message.camera_id = select.getColumn(3).getString();
+      message.boot_id = static_cast<std::uint64_t>(select.getColumn(4).getInt64());
+      message.sequence = static_cast<std::uint64_t>(select.getColumn(5).getInt64());
+    }
+    message.reception.received_ns = select.getColumn(6).getInt64();
+    const SQLite::Column blob = select.getColumn(7);
+    const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
+    message.bytes.assign(bytes, bytes + blob.getBytes());
+    message.reception.late = select.getColumn(8).getInt() != 0;
+    if (!select.isColumnNull(9)) message.reception.clock_offset_ns = select.getColumn(9).getInt64();
+    messages.push_back(std::move(message));
+  }
+  return messages;
+}
+
 class SqliteStore final : public SessionStore {
  public:
   SqliteStore(const std::filesystem::path& path, FileLock lock)
@@ -80,16 +62,9 @@ class SqliteStore final : public SessionStore {
         db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
 
   Result<void> prepare() {
-    const auto version = known_version(db_, path_);
-    if (!version) return pass_on(version.error());
+    if (auto prepared = prepare_schema(db_, path_); !prepared) return prepared;
     db_.exec("PRAGMA journal_mode = WAL");
     db_.exec("PRAGMA synchronous = FULL");
-    if (*version < kSchemaVersion) {
-      SQLite::Transaction transaction(db_);
-      db_.exec(*version == 0 ? kSchema : kFromSchema1);
-      db_.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
-      transaction.commit();
-    }
     return {};
   }
 
@@ -260,22 +235,47 @@ ORDER BY start.newest, message.sequence)sql");
 
   Result<std::vector<StoredMessage>> messages(const std::string& session) override {
     return guarded<std::vector<StoredMessage>>([&] {
-      SQLite::Statement select(db_,
-                               "SELECT camera IS NULL, received_ns, bytes, late, clock_offset_ns FROM message "
-                               "WHERE session = ? ORDER BY id");
+      SQLite::Statement select(db_, std::string(kSelectMessage) + "WHERE session = ? ORDER BY id");
       select.bind(1, session);
-      std::vector<StoredMessage> messages;
-      while (select.executeStep()) {
-        const SQLite::Column blob = select.getColumn(2);
-        const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
-        StoredMessage message{
-            select.getColumn(0).getInt() != 0,
-            {.received_ns = select.getColumn(1).getInt64(), .late = select.getColumn(3).getInt() != 0},
-            {bytes, bytes + blob.getBytes()}};
-        if (!select.isColumnNull(4)) message.reception.clock_offset_ns = select.getColumn(4).getInt64();
-        messages.push_back(std::move(message));
-      }
-      return messages;
+      return read_messages(select);
+    });
+  }
+
+  Result<std::string> identity() override {
+    return guarded<std::string>([&] { return db_.execAndGet("SELECT store FROM identity").getString(); });
+  }
+
+  Result<void> renew_identity() override {
+    return guarded<int>([&] { return db_.exec("UPDATE identity SET store = lower(hex(randomblob(16)))"); })
+        .map([](int) {});
+  }
+
+  Result<std::vector<StoredMessage>> messages_after(std::int64_t id, int limit) override {
+    return guarded<std::vector<StoredMessage>>([&] {
+      SQLite::Statement select(db_, std::string(kSelectMessage) + "WHERE id > ? ORDER BY id LIMIT ?");
+      select.bind(1, id);
+      select.bind(2, limit);
+      return read_messages(select);
+    });
+  }
+
+  Result<std::vector<StoredResult>> results_after(std::int64_t revision, int limit) override {
+    return guarded<std::vector<StoredResult>>([&] {
+      SQLite::Statement select(db_, std::string(kSelectResult) + "WHERE revision > ? ORDER BY revision LIMIT ?");
+      select.bind(1, revision);
+      select.bind(2, limit);
+      std::vector<StoredResult> results;
+      while (select.executeStep()) results.push_back(read_result(select));
+      return results;
+    });
+  }
+
+  Result<HistoryPosition> newest() override {
+    return guarded<HistoryPosition>([&] {
+      SQLite::Statement select(db_, R"sql(
+SELECT ifnull((SELECT max(id) FROM message), 0), ifnull((SELECT max(revision) FROM result), 0))sql");
+      select.executeStep();
+      return HistoryPosition{select.getColumn(0).getInt64(), select.getColumn(1).getInt64()};
     });
   }
 

@@ -46,9 +46,21 @@ struct Reception {
 
 /// A message as it was received.
 struct StoredMessage {
-  bool is_trigger = false;          ///< else an imprint
+  std::int64_t id = 0;  ///< grows in the order of receipt
+  std::string session;
+  std::int64_t observation = 0;
+  bool is_trigger = false;  ///< else an imprint
+  std::string camera_id;    ///< of an imprint, as the next two
+  std::uint64_t boot_id = 0;
+  std::uint64_t sequence = 0;
   Reception reception;              ///< of a trigger only the time
   std::vector<std::uint8_t> bytes;  ///< as they came over the wire
+};
+
+/// How far a history reaches: its newest message and its newest result, 0 where there is none.
+struct HistoryPosition {
+  std::int64_t message = 0;   ///< StoredMessage::id
+  std::int64_t revision = 0;  ///< StoredResult::revision
 };
 
 /// What fusion must not lose: every trigger and imprint as received, and each session's latest result, in one SQLite
@@ -89,6 +101,16 @@ class SessionStore {
                                                                                  int starts) = 0;
   /// All messages of a session in the order they were received.
   virtual Result<std::vector<StoredMessage>> messages(const std::string& session) = 0;
+
+  /// What a copy elsewhere knows this database by; made with it.
+  virtual Result<std::string> identity() = 0;
+  /// The database is another one from now on: it was put back to an older state than its copies have.
+  virtual Result<void> renew_identity() = 0;
+  /// Messages newer than `id`, of all sessions, the oldest `limit`.
+  virtual Result<std::vector<StoredMessage>> messages_after(std::int64_t id, int limit) = 0;
+  /// Results as they stand now with a revision above this one, the oldest `limit`.
+  virtual Result<std::vector<StoredResult>> results_after(std::int64_t revision, int limit) = 0;
+  virtual Result<HistoryPosition> newest() = 0;
 };
 
 }  // namespace imprint

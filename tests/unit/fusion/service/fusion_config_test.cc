@@ -52,6 +52,26 @@ TEST_CASE("fusion config: what is printed reads back as the same config") {
   REQUIRE(again->rest.lead_ms == 250.0);
 }
 
+#ifdef IMPRINT_POSTGRESQL
+TEST_CASE("fusion config: where histories go is a connection string without a password") {
+  const TemporaryFolder folder;
+  const std::string rig = "[fusion]\nrig = \"r\"\n[history]\npostgresql = ";
+  const auto config = read(folder, rig + "\"postgresql://imprint@db.plant/imprint\"\n");
+  REQUIRE(config);
+  CHECK(read(folder, to_toml(*config))->postgresql == "postgresql://imprint@db.plant/imprint");
+  CHECK(read(folder, rig + "\"service=plant dbname=imprint\"\n"));
+  const auto refused = fault(rig + "\"postgresql://imprint:hot-steel@db.plant/imprint\"\n");
+  CHECK(refused.find("fusion.toml:4: history.postgresql: a password does not belong here") != std::string::npos);
+  CHECK(refused.find("hot-steel") == std::string::npos);
+  CHECK(fault(rig + "\"db.plant\"\n").find("expected postgresql://") != std::string::npos);
+}
+#else
+TEST_CASE("fusion config: a program without PostgreSQL says so when histories are to go there") {
+  CHECK(fault("[fusion]\nrig = \"r\"\n[history]\npostgresql = \"postgresql:///imprint\"\n")
+            .find("built without PostgreSQL") != std::string::npos);
+}
+#endif
+
 TEST_CASE("fusion config: a fault names the file, the line and the key") {
   REQUIRE(
       fault("[fusion]\nrig = \"r\"\ndeadline_s = 0\n").find("fusion.toml:3: fusion.deadline_s: expected more than 0") !=

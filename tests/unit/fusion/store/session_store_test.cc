@@ -57,24 +57,6 @@ TEST_CASE("store: what was received comes back byte for byte and in order, also 
   REQUIRE_FALSE(messages[2].is_trigger);
 }
 
-TEST_CASE("store: a database of schema 1 is taken over with what it holds") {
-  const TemporaryFolder folder;
-  {
-    auto store = open(folder / "a.db");
-    REQUIRE(*store->add_imprint(imprint_of("cam1", 1), Bytes{1, 0, 2}, {11}));
-  }
-  {
-    SQLite::Database db(folder / "a.db", SQLite::OPEN_READWRITE);
-    db.exec(
-        "ALTER TABLE message DROP COLUMN late; ALTER TABLE message DROP COLUMN clock_offset_ns;"
-        "PRAGMA user_version = 1");
-  }
-  auto store = open(folder / "a.db");
-  REQUIRE(store->messages("S")->at(0).bytes == Bytes{1, 0, 2});
-  REQUIRE(*store->add_imprint(imprint_of("cam2", 1), Bytes{3}, {12, true, 5}));
-  REQUIRE(store->messages("S")->at(1).reception.late);
-}
-
 TEST_CASE("store: an imprint or a trigger that is there already is not stored again") {
   const TemporaryFolder folder;
   auto store = open(folder / "a.db");
@@ -127,6 +109,44 @@ TEST_CASE("store: unfinished sessions are those without a complete result or wit
   REQUIRE(*store->unfinished(10) == std::vector<std::string>{"open", "none"});
   REQUIRE(*store->knows("done"));
   REQUIRE_FALSE(*store->knows("elsewhere"));
+}
+
+TEST_CASE("store: what came after a position is found, results as they stand now") {
+  const TemporaryFolder folder;
+  auto store = open(folder / "a.db");
+  REQUIRE(*store->add_trigger({"S", 3, 0.0, 0, 1}, Bytes{9}, 10));
+  REQUIRE(*store->add_imprint(imprint_of("cam1", 7, "S", 0xFFFFFFFFFFFFFFFFULL), Bytes{1}, {11, true, -3}));
+  REQUIRE(store->put_result(result_of("S", false, "")));
+  REQUIRE(store->put_result(result_of("T", true, "{}")));
+  REQUIRE(store->put_result(result_of("S", true, "{}")));
+  const auto all = *store->messages_after(0, 10);
+  REQUIRE(all.size() == 2);
+  CHECK(all[0].is_trigger);
+  CHECK(all[0].observation == 3);
+  CHECK(all[1].session == "S");
+  CHECK(all[1].camera_id == "cam1");
+  CHECK(all[1].boot_id == 0xFFFFFFFFFFFFFFFFULL);
+  CHECK(all[1].sequence == 7);
+  CHECK(all[1].reception.clock_offset_ns == -3);
+  CHECK(store->messages_after(0, 1)->size() == 1);
+  CHECK(store->messages_after(all[0].id, 10)->front().id == all[1].id);
+  const auto results = *store->results_after(0, 10);
+  REQUIRE(results.size() == 2);
+  CHECK(results[0].session == "T");
+  CHECK(results[1].session == "S");
+  CHECK(results[1].complete);
+  CHECK(store->results_after(3, 10)->empty());
+  CHECK(store->newest()->message == all[1].id);
+  CHECK(store->newest()->revision == 3);
+}
+
+TEST_CASE("store: a database has one identity, until it is told to be another") {
+  const TemporaryFolder folder;
+  const auto first = *open(folder / "a.db")->identity();
+  CHECK(*open(folder / "a.db")->identity() == first);
+  CHECK(*open(folder / "b.db")->identity() != first);
+  REQUIRE(open(folder / "a.db")->renew_identity());
+  CHECK(*open(folder / "a.db")->identity() != first);
 }
 
 TEST_CASE("store: a process killed without warning loses nothing it was told is stored") {
