@@ -4,10 +4,11 @@ import sys
 import time
 
 import gige
+import host
 import update
 import vivid
 
-TESTS = {"vivid": vivid.main, "gige": gige.main, "update": update.main}
+TESTS = {"vivid": vivid.main, "gige": gige.main, "host": host.main, "update": update.main}
 
 
 def main(build, names):
