@@ -1,4 +1,5 @@
 #include "cli/result_summary.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 
@@ -12,9 +13,7 @@ using Section = Measurement::Section;
 double median_of(const Measurement& m, double Section::*value) {
   std::vector<double> values;
   for (const auto& section : m.sections) values.push_back(section.*value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(std::move(values));
 }
 
 std::string place(const Section& section) { return fmt::format("at {:.0f} mm from the first end", section.s_mm); }

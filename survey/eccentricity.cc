@@ -1,4 +1,5 @@
 #include "survey/eccentricity.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -56,12 +57,6 @@ Eigen::Matrix<double, 2, 3> projection_slope(const CameraModel& camera, const Ca
   Eigen::Matrix<double, 2, 3> by_p;
   by_p << f / p.z(), 0.0, -f * p.x() / (p.z() * p.z()), 0.0, f / p.z(), -f * p.y() / (p.z() * p.z());
   return distortion_jacobian(camera, project_ideal(camera, p)) * by_p * pose.R_cam_world;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // What one sight tells of its target's disc.

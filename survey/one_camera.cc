@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "lib/geometry/median.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
@@ -38,9 +39,7 @@ FocalDeviation deviation_of(const Network& network, std::size_t photo, const std
       sizes.push_back(residuals.back().norm());
     }
     if (slopes.size() < kFewest) return result;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    const double sigma = std::max(1e-6, *middle / 1.1774);  // of each coordinate
+    const double sigma = std::max(1e-6, median(std::move(sizes)) / 1.1774);  // of each coordinate
     Matrix7 normal = Matrix7::Zero();
     Vector7 right = Vector7::Zero();
     for (std::size_t i = 0; i < slopes.size(); ++i) {

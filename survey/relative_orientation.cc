@@ -1,4 +1,5 @@
 #include "survey/relative_orientation.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -102,9 +103,7 @@ double parallax_rad(const std::vector<RayPair>& pairs) {
   std::vector<double> angles;
   for (const RayPair& pair : pairs)
     angles.push_back((turn * pair.first.homogeneous().normalized() - pair.second.homogeneous().normalized()).norm());
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  return *middle;
+  return median(std::move(angles));
 }
 
 }  // namespace imprint

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 #include <Eigen/Geometry>
 
+#include "lib/geometry/median.h"
 #include "node/resect/start_pose.h"
 #include "survey/eccentricity.h"
 #include "survey/one_camera.h"
@@ -18,12 +19,6 @@ namespace {
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr int kPhotoNeeds = 4;          // sights of a photograph that stays
 constexpr double kBarFloor_ppm = 50.0;  // of its length: what centres, refraction and a bar's mounting add (ours)
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // "a, b, c and 4 more"
 template <class Items>

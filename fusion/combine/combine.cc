@@ -8,6 +8,7 @@
 #include "fusion/combine/combine_config.h"
 #include "fusion/combine/joint_estimate.h"
 #include "fusion/combine/joint_start.h"
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {
@@ -21,9 +22,7 @@ void bridge_unknown_radii(JointEstimate& joint) {
   constexpr double kOutside = 0.01;  // of the radius
   std::vector<double> sigmas;
   for (const NodeMatrix& covariance : joint.covariance) sigmas.push_back(std::sqrt(covariance(kRadius, kRadius)));
-  std::vector<double> sorted = sigmas;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double usual = sorted[sorted.size() / 2];
+  const double usual = median(sigmas);
   const auto sharp = [&](std::size_t i) {
     return sigmas[i] <= std::max(kTimesUsual * usual, kLeastShare * std::abs(joint.nodes[i](kRadius)));
   };

@@ -7,6 +7,7 @@
 #include "fusion/combine/rod_surface.h"
 #include "fusion/combine/tangent_rows.h"
 #include "fusion/combine/unseen_steps.h"
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {
@@ -28,7 +29,7 @@ class JointSolver {
       : config_(config),
         step_mm_(start.x_step_mm),
         length_mm_(start.x_step_mm * static_cast<double>(start.yz_mm.size() - 1)),
-        radius_mm_(median(start_radius_mm)),
+        radius_mm_(median({start_radius_mm.begin(), start_radius_mm.end()})),
         end_margin_(1.0 + 2.0 * shift_sigma_mm / start.x_step_mm),
         prior_(unseen_steps(observations, start_radius_mm, start.x_step_mm), start.x_step_mm, radius_mm_,
                config.out_of_round_share, config.out_of_round_length_share * length_mm_),
@@ -77,12 +78,6 @@ class JointSolver {
 
  private:
   enum class Use { estimate, held, interval };
-
-  static double median(std::span<const double> values) {
-    std::vector<double> sorted(values.begin(), values.end());
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
 
   /// On a shoulder the value hangs on where along x the ray touches, and so on the out-of-round as far as it is not
   /// known yet.

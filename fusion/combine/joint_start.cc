@@ -1,4 +1,5 @@
 #include "fusion/combine/joint_start.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -145,10 +146,7 @@ double mm_per_px(std::span<const ObservedForging> observations) {
   for (const ObservedForging& observed : observations)
     for (const ObservedSection& section : observed.sections)
       for (const TangentPlane& tangent : section.tangents) scales.push_back(tangent.mm_per_px);
-  if (scales.empty()) return 0.0;
-  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
-  std::nth_element(scales.begin(), middle, scales.end());
-  return *middle;
+  return median(std::move(scales));
 }
 
 Result<void> within_rig(std::span<const ObservedForging> observations, const ForgingSpec& forging,

@@ -1,4 +1,5 @@
 #include "fusion/comparison/comparison.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +10,6 @@ namespace imprint {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void move(Points& points, const Placement& placement) {
   for (Eigen::Vector3d& point : points) point = placement.point(point);

@@ -1,4 +1,5 @@
 #include "fusion/faceted/corner_model.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -13,13 +14,6 @@ namespace imprint {
 namespace {
 
 Eigen::Vector2d towards(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double robust_scatter(const CornerModel& section, std::span<const SupportSample> samples) {
   std::vector<double> off;

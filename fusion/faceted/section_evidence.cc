@@ -1,4 +1,5 @@
 #include "fusion/faceted/section_evidence.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +8,6 @@
 
 namespace imprint {
 namespace {
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// How many times as wide as in `first` the forging is in `later`, in the median of the stations that show both rims in
 /// both: where scale hides now the thin, now the thick part, the widths themselves would differ. 1 where too few do.

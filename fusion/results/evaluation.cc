@@ -6,6 +6,7 @@
 
 #include "fusion/results/roundness.h"
 #include "fusion/results/straightness.h"
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {
@@ -61,11 +62,10 @@ std::vector<std::size_t> well_known(const CombinedForging& forging) {
   constexpr double kTimesUsual = 4.0;
   std::vector<double> sigmas;
   for (const CombinedSection& section : forging.sections) sigmas.push_back(section.diameter_sigma_mm);
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  const double usual = median(std::move(sigmas));
   std::vector<std::size_t> known;
   for (std::size_t i = 0; i < forging.sections.size(); ++i)
-    if (forging.sections[i].diameter_sigma_mm <= kTimesUsual * *middle) known.push_back(i);
+    if (forging.sections[i].diameter_sigma_mm <= kTimesUsual * usual) known.push_back(i);
   return known;
 }
 

@@ -1,4 +1,5 @@
 #include "fusion/results/measurement.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -66,13 +67,7 @@ Measurement::Sureness sureness(const CombinedForging& forging) {
     diameter.push_back(kCi95 * section.diameter_sigma_mm);
     circularity.push_back(kCi95 * section.circularity_sigma_mm);
   }
-  const auto median = [](std::vector<double>& values) {
-    if (values.empty()) return 0.0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  return {median(axis), median(diameter), median(circularity)};
+  return {median(std::move(axis)), median(std::move(diameter)), median(std::move(circularity))};
 }
 
 Measurement::Section section_at(const Measurement& measurement, double s_mm) {

@@ -1,4 +1,5 @@
 #include "fusion/triangulate/end_planes.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,9 +16,7 @@ double median_x(std::span<const EndPoint> points, bool last) {
   std::vector<double> x;
   for (const EndPoint& point : points)
     if (point.last == last) x.push_back(point.x_mm);
-  if (x.empty()) return 0.0;
-  std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
-  return x[x.size() / 2];
+  return median(std::move(x));
 }
 
 }  // namespace

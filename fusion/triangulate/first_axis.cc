@@ -1,4 +1,5 @@
 #include "fusion/triangulate/first_axis.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -144,9 +145,7 @@ Result<AxisCurve> line_through(std::span<const Eigen::Vector3d> points, const Ei
       return job_failed("the axis points of the cameras form no line: check the poses and the imprints");
     direction = solver.eigenvectors().col(2);
     for (std::size_t i = 0; i < points.size(); ++i) distance[i] = (points[i] - center).cross(direction).norm();
-    std::vector<double> sorted = distance;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    const double scale = std::max(2.0 * sorted[sorted.size() / 2], 1e-6);
+    const double scale = std::max(2.0 * median(distance), 1e-6);
     for (std::size_t i = 0; i < points.size(); ++i) weight[i] = 1.0 / (1.0 + std::pow(distance[i] / scale, 2));
   }
   if (direction.dot(axis_direction) < 0.0) direction = -direction;

@@ -1,4 +1,5 @@
 #include "fusion/triangulate/rod_consensus.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -185,13 +186,6 @@ void move_axis(RodConsensus& rod, std::span<const RimTangent> tangents, int degr
     rod.axis.yz_mm[i] += Eigen::Vector2d(p.dot(solution.head(terms)), p.dot(solution.tail(terms)));
   }
   rod.axis.set_slopes();
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "lib/adjust/collinearity_error.h"
 #include "lib/adjust/own_focal_length.h"
 #include "lib/adjust/variance_components.h"
+#include "lib/geometry/median.h"
 #include "lib/geometry/rotation.h"
 
 namespace imprint {
@@ -49,12 +50,6 @@ struct Observation {
   }
   [[nodiscard]] CollinearityError error(const CameraModel& camera) const { return error(camera, sigma_px); }
 };
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class Adjustment {
  public:

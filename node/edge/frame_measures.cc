@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "lib/geometry/median.h"
 #include "node/edge/rim_haze.h"
 #include "node/edge/scan_lines.h"
 #include "node/edge/silhouette_frame.h"
@@ -11,12 +12,6 @@
 
 namespace imprint {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double full_scale(const cv::Mat& image) { return image.depth() == CV_16U ? 65535.0 : 255.0; }
 

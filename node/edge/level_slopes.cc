@@ -1,4 +1,5 @@
 #include "node/edge/level_slopes.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -48,9 +49,7 @@ SlopeEvidence evidence_of(const FittedLine& line) {
 double median_residual(std::span<const FittedLine> lines) {
   std::vector<double> residuals;
   for (const FittedLine& line : lines) residuals.push_back(line.fit.residual);
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return *middle;
+  return median(std::move(residuals));
 }
 
 }  // namespace

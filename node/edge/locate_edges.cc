@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "lib/geometry/median.h"
 #include "node/edge/body_brightness.h"
 #include "node/edge/edge_config.h"
 #include "node/edge/forging_ends.h"
@@ -36,13 +37,8 @@ EndSearch describe_end(const Segmentation& s, bool at_start) {
     middles.push_back(0.5 * (upper + lower));
     if (static_cast<double>(widths.size()) > 0.3 * widths.front()) break;
   }
-  const auto median = [](std::vector<double>& v) {
-    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-    std::nth_element(v.begin(), middle, v.end());
-    return *middle;
-  };
-  search.diameter_px = median(widths);
-  search.axis_offset_px = median(middles);
+  search.diameter_px = median(std::move(widths));
+  search.axis_offset_px = median(std::move(middles));
   search.station_px = at_start ? s.first_station_px : s.first_station_px + static_cast<double>(n) - 1;
   return search;
 }
@@ -139,13 +135,9 @@ Silhouette locate_edges(const cv::Mat& image, const Segmentation& segmentation, 
   lower.body = upper.body;
   RimEdges upper_edges = find_rim_edges(image, frame, upper, polarity, method, config);
   RimEdges lower_edges = find_rim_edges(image, frame, lower, polarity, method, config);
-  std::vector<float> steps(upper_edges.step);
+  std::vector<double> steps(upper_edges.step.begin(), upper_edges.step.end());
   steps.insert(steps.end(), lower_edges.step.begin(), lower_edges.step.end());
-  if (!steps.empty()) {
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    silhouette.contrast = *middle;
-  }
+  silhouette.contrast = median(std::move(steps));
   silhouette.upper = std::move(upper_edges.points);
   silhouette.lower = std::move(lower_edges.points);
   silhouette.saturated_fraction = saturated_fraction(image, frame, upper, lower);

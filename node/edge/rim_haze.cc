@@ -1,4 +1,5 @@
 #include "node/edge/rim_haze.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +9,6 @@ namespace imprint {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // One a station from the first edge point's on; NaN where there is none.
 std::vector<double> offsets_of(const std::vector<EdgePoint>& points) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/geometry/median.h"
 #include "node/edge/level_slopes.h"
 
 namespace imprint {
@@ -32,12 +33,6 @@ std::optional<StepFit> fit_at(const ScanLines& scan, const TracedEdge& traced, d
   window = fit_window(line, traced, blur, 0.0);
   return fit_step(scan.samples(line) + window.from, window.count, traced.edge.position_px - line.first_px - window.from,
                   blur, free_blur);
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The blur of every region of the rim: medians of free fits.

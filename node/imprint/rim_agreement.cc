@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/geometry/median.h"
 #include "node/imprint/rim_steps.h"
 
 namespace imprint {
@@ -19,9 +20,7 @@ double bisquare(double residual, double cutoff) {
 
 double median_size(std::vector<double> values) {
   for (double& v : values) v = std::abs(v);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(std::move(values));
 }
 
 // How far the middle lies off its parabola over the whole length, and where that is too far for a body that is bent.

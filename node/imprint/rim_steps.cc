@@ -1,16 +1,11 @@
 #include "node/imprint/rim_steps.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace imprint {
 namespace {
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Median offset of the samples in [from, to]; nothing when there are fewer than three.
 std::optional<double> median_between(const RimCurve& rim, double from, double to) {

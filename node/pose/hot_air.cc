@@ -1,4 +1,5 @@
 #include "node/pose/hot_air.h"
+#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,12 +12,6 @@ struct Band {
   double first_px = 0.0, last_px = 0.0;  // stations
   double middle_px = 0.0, half_width_px = 0.0;
 };
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Band band_of(const Segmentation& forging) {
   std::vector<double> widths, middles;

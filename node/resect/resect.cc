@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 #include <Eigen/Cholesky>
 
+#include "lib/geometry/median.h"
 #include "node/resect/start_pose.h"
 
 namespace imprint {
@@ -102,12 +103,6 @@ CameraPose adjust(const std::vector<Observation>& observations, CameraPose pose,
     if (settled) break;
   }
   return pose;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // How much larger the residuals are than their sigmas, robustly; at least 1.

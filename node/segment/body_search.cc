@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/geometry/median.h"
 #include "node/segment/body_levels.h"
 #include "node/segment/body_rims.h"
 
@@ -51,12 +52,6 @@ float least_body_level(const BodyPath& path, const WorkingImage& working, const 
   return dark + static_cast<float>(config.min_body_level) * (usual - dark);
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Cuts off what goes on behind an end: from `inside_x_px` outwards, where over a third of the width brightness and
 // width change together (a jaw), or the width leaves what one forging at one distance can have.
 void cut_ends(BodyPath& path, const BodyLevels& levels, int inside_x_px) {
@@ -76,7 +71,7 @@ void cut_ends(BodyPath& path, const BodyLevels& levels, int inside_x_px) {
     std::vector<double> values;
     for (int i = std::max(0, std::min(from, to)); i <= std::min(n - 1, std::max(from, to)); ++i)
       values.push_back(value(i));
-    return values.empty() ? 0.0 : median_of(std::move(values));
+    return imprint::median(std::move(values));
   };
   const int inside = std::clamp(inside_x_px - path.columns.front().x_px, 0, n - 1);
   int ends[2] = {0, n - 1};
