@@ -1,9 +1,10 @@
 #include "cli/result_summary.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 
 #include <fmt/core.h>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

@@ -1,5 +1,4 @@
 #include "survey/eccentricity.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -9,6 +8,8 @@
 
 #include <ceres/ceres.h>
 #include <Eigen/Geometry>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

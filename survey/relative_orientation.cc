@@ -1,5 +1,4 @@
 #include "survey/relative_orientation.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,8 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

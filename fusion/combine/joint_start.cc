@@ -1,8 +1,9 @@
 #include "fusion/combine/joint_start.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

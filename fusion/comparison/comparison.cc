@@ -1,10 +1,11 @@
 #include "fusion/comparison/comparison.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Dense>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

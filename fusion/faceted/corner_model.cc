@@ -1,5 +1,4 @@
 #include "fusion/faceted/corner_model.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -9,6 +8,8 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

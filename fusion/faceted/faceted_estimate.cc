@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fusion/combine/tangent_rows.h"
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {
@@ -13,9 +14,11 @@ constexpr double kLeastNoise = 0.2;  // of the stated sigma
 constexpr std::size_t kEnoughObservations = 3;
 constexpr double kFreedom = 4.0;            // of Student's t for the tangents
 constexpr double kMedianOfSquare = 0.4549;  // of a squared normal value
+constexpr double kMostFollowed = 0.8;       // of the noise by the fit, beyond which the rest says too little
 constexpr double kPlaceShare = 0.02;        // variance of a station's place along x, in squared steps between nodes
-constexpr double kWander = 0.01;            // of the size, by which corners leave the axis' bend over the length
+constexpr double kWander = 0.01;            // of the size, by which corners leave their middle over the length
 constexpr double kStepFreedom = 4.0;        // of Student's t for that; a shoulder is free
+constexpr double kBend = 0.1;               // of the size, by which their middle leaves the start's axis
 constexpr double kRadiusShare = 0.5;        // sigma of the corners' radius about the start's
 constexpr double kRadiusWander = 0.3;       // and of its change along the forging
 // Of the section's size: what a forging of a family departs from it.
@@ -23,7 +26,9 @@ constexpr double kNotAffine = 0.02, kNotSimilar = 0.01, kConvexNotAffine = 0.2;
 
 template <int kCorners>
 class FacetedSolver {
-  static constexpr int kUnknowns = 2 * kCorners + 1;
+  static constexpr int kCoordinates = 2 * kCorners;
+  static constexpr int kUnknowns = kCoordinates + 1;
+  using Coordinates = Eigen::Matrix<double, kCoordinates, kCoordinates>;
   using System = BorderedChain<kUnknowns>;
   using Matrix = typename System::Matrix;
   using Vector = typename System::Vector;
@@ -56,6 +61,7 @@ class FacetedSolver {
         places_(tangents_.viewers, start.placements, length_mm_, size_mm_, start.shift_sigma_mm, config),
         system_(std::make_shared<System>(static_cast<int>(sections.size()), places_.unknowns())),
         density_(std::pow(kWander * size_mm_, 2) / length_mm_),
+        bend_density_(kCorners * std::pow(kBend * size_mm_, 2) / length_mm_),
         trust_(sections.size() - 1, 1.0) {
     for (const CornerModel& section : sections) {
       Vector node;
@@ -105,13 +111,11 @@ class FacetedSolver {
     constexpr std::size_t kApart = 50;
     drift_mm_.setZero();
     if (nodes_.size() <= 2 * kApart) return;
-    for (int j = 0; j < 2 * kCorners; ++j) {
+    for (int j = 0; j < kCoordinates; ++j) {
       std::vector<double> changes;
       for (std::size_t i = 0; i + kApart < nodes_.size(); ++i)
         changes.push_back(nodes_[i + kApart](j) - nodes_[i](j) - (axis_.yz_mm[i + kApart] - axis_.yz_mm[i])(j % 2));
-      const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-      std::nth_element(changes.begin(), middle, changes.end());
-      drift_mm_(j) = *middle / static_cast<double>(kApart);
+      drift_mm_(j) = median(std::move(changes)) / static_cast<double>(kApart);
     }
   }
   /// What a corner's coordinate is expected to change by from node i to the next.
@@ -160,25 +164,35 @@ class FacetedSolver {
            places_.made_by_places(e, viewer, system_->border_solution);
   }
 
+  /// What all corners do alike.
+  static Coordinates together_only() {
+    Coordinates alike = Coordinates::Zero();
+    for (int j = 0; j < kCoordinates; ++j)
+      for (int k = j % 2; k < kCoordinates; k += 2) alike(j, k) = 1.0 / kCorners;
+    return alike;
+  }
+
   void add_prior() {
     const double wander = std::pow(kRadiusWander * start_radius_mm_, 2) / length_mm_;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       Matrix& own = system_->diagonal[i];
-      own.template topLeftCorner<2 * kCorners, 2 * kCorners>() += prior_;
+      own.template topLeftCorner<kCoordinates, kCoordinates>() += prior_;
       own.diagonal().array() += 1e-9 / (size_mm_ * size_mm_);
       own(kUnknowns - 1, kUnknowns - 1) += radius_precision_;
       system_->right[i](kUnknowns - 1) += radius_precision_ * start_radius_mm_;
       if (i + 1 == nodes_.size()) continue;
-      for (int j = 0; j < kUnknowns; ++j) {
-        const bool radius = j + 1 == kUnknowns;
-        const double precision = 1.0 / (radius ? wander * step_mm_ : density_ * step_mm_ / trust_[i]);
-        own(j, j) += precision;
-        system_->diagonal[i + 1](j, j) += precision;
-        system_->upper[i](j, j) -= precision;
-        if (radius) continue;
-        system_->right[i](j) -= precision * expected_mm(i, j);
-        system_->right[i + 1](j) += precision * expected_mm(i, j);
-      }
+      Matrix precision = Matrix::Zero();
+      precision(kUnknowns - 1, kUnknowns - 1) = 1.0 / (wander * step_mm_);
+      precision.template topLeftCorner<kCoordinates, kCoordinates>() =
+          trust_[i] / (density_ * step_mm_) * (Coordinates::Identity() - together_only()) +
+          together_only() / (bend_density_ * step_mm_);
+      own += precision;
+      system_->diagonal[i + 1] += precision;
+      system_->upper[i] -= precision;
+      Vector expected = Vector::Zero();
+      for (int j = 0; j < kCoordinates; ++j) expected(j) = expected_mm(i, j);
+      system_->right[i] -= precision * expected;
+      system_->right[i + 1] += precision * expected;
     }
   }
 
@@ -219,7 +233,8 @@ class FacetedSolver {
     std::vector<std::optional<Equation>> equations;
     if (!solve(equations)) return false;
     nodes_ = system_->node_solution;
-    std::vector<double> squares;
+    std::vector<double> squares;  // of the deviations, in the stated variances
+    double followed = 0.0;        // of the noise, by the fit: what its freedom takes from those squares
     for (std::size_t r = 0; r < equations.size(); ++r) {
       TangentRow& row = tangents_.rows[r];
       row.used = equations[r].has_value();
@@ -231,42 +246,49 @@ class FacetedSolver {
       const double fitted = here * here * g.dot(own_[e.node] * g) + e.share * e.share * g.dot(own_[e.node + 1] * g) +
                             2.0 * here * e.share * g.dot(with_next_[e.node] * g);
       const double expected = row.residual_mm * row.residual_mm + fitted;
-      squares.push_back(expected / row.variance_mm2);
-      const double variance = row.variance_mm2 * noise_scale_ * noise_scale_ + e.extra_variance_mm2;
+      squares.push_back(row.residual_mm * row.residual_mm / row.variance_mm2);
+      const double noise = row.variance_mm2 * noise_scale_ * noise_scale_;
+      followed += std::min(fitted / (noise * together_), 1.0);
+      const double variance = noise + e.extra_variance_mm2;
       row.trust = (kFreedom + 1.0) / (kFreedom + expected / variance);
     }
     places_.take(system_->border_solution);
     if (squares.empty()) return false;
     if (round < kRoughRounds) return true;
-    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-    std::nth_element(squares.begin(), middle, squares.end());
     // Of few observations the sections can follow any noise: then what the rims scatter at first has to do.
-    if (places_.placements().size() >= kEnoughObservations)
-      noise_scale_ = std::max(kLeastNoise, std::sqrt(*middle / kMedianOfSquare));
+    if (places_.placements().size() >= kEnoughObservations) {
+      const double left = 1.0 - std::min(followed / static_cast<double>(squares.size()), kMostFollowed);
+      noise_scale_ = std::max(kLeastNoise, std::sqrt(median(std::move(squares)) / kMedianOfSquare / left));
+    }
     together_ = std::max(kTogether, moved_together(tangents_, noise_scale_));
     learn();
     return true;
   }
 
   void learn() {
-    std::vector<double> squared, spread;
+    const Coordinates alike = together_only();
+    std::vector<double> apart;
+    double bend = 0.0;
     for (std::size_t i = 0; i + 1 < nodes_.size(); ++i) {
-      double squares = 0.0, open = 0.0;
-      for (int j = 0; j < 2 * kCorners; ++j) {
-        squares += std::pow(nodes_[i + 1](j) - nodes_[i](j) - expected_mm(i, j), 2);
-        open += own_[i](j, j) + own_[i + 1](j, j) - 2.0 * with_next_[i](j, j);
-      }
-      squared.push_back(squares / (2 * kCorners));
-      spread.push_back(open / (2 * kCorners));
+      Eigen::Matrix<double, kCoordinates, 1> change;
+      for (int j = 0; j < kCoordinates; ++j) change(j) = nodes_[i + 1](j) - nodes_[i](j) - expected_mm(i, j);
+      const auto of = [](const Matrix& m) { return m.template topLeftCorner<kCoordinates, kCoordinates>(); };
+      const Coordinates moved = change * change.transpose() + of(own_[i]) + of(own_[i + 1]) - of(with_next_[i]) -
+                                of(with_next_[i]).transpose();
+      const double common = alike.cwiseProduct(moved).sum();
+      bend += common / 2.0;
+      apart.push_back((moved.trace() - common) / (kCoordinates - 2));
     }
     // Expectation maximisation, step by step: where no tangent shows a change it stays what a forging usually does.
     const double variance = density_ * step_mm_;
-    double sum = 0.0, count = 0.0;
+    double sum = 0.0;
     for (std::size_t i = 0; i < trust_.size(); ++i) {
-      trust_[i] = (kStepFreedom + 1.0) / (kStepFreedom + (squared[i] + spread[i]) / variance);
-      sum += trust_[i] * (squared[i] + spread[i]), count += 1.0;
+      trust_[i] = (kStepFreedom + 1.0) / (kStepFreedom + apart[i] / variance);
+      sum += trust_[i] * apart[i];
     }
-    density_ = sum / count / step_mm_;
+    const double steps = static_cast<double>(trust_.size()) * step_mm_;
+    density_ = sum / steps;
+    bend_density_ = bend / steps;
   }
 
   CombineConfig config_;
@@ -277,10 +299,11 @@ class FacetedSolver {
   std::shared_ptr<System> system_;
   std::vector<Vector> nodes_;
   std::vector<Matrix> own_, with_next_;
-  Eigen::Matrix<double, 2 * kCorners, 2 * kCorners> prior_;
-  Eigen::Matrix<double, 2 * kCorners, 1> drift_mm_;
+  Coordinates prior_;
+  Eigen::Matrix<double, kCoordinates, 1> drift_mm_;
   double radius_precision_ = 0.0;
-  double density_;  ///< mm^2 of variance of a corner's place per mm, beside the axis' bend
+  double density_;       ///< mm^2 of variance per mm of a corner's place about the corners' middle
+  double bend_density_;  ///< and of that middle about the start's axis, times the corners
   std::vector<double> trust_;
   double noise_scale_ = 0.0, together_ = kTogether;
 };

@@ -1,10 +1,12 @@
 #include "fusion/faceted/section_evidence.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
+#include <tuple>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {
@@ -51,18 +53,50 @@ double change_of_width(std::span<const std::vector<Imprint>> observations) {
   return changes[1];
 }
 
+namespace {
+
+/// A tangent where it touches the start's rod.
+struct Touch {
+  Eigen::Vector2d normal;
+  double distance_mm;
+  std::size_t node, rim;
+};
+
+/// Size of the section at each node, of the shape that the rims show together: what a rim has more than others counts
+/// for the shape, what it gains along the forging for the size. Which rims scale hides then does not matter.
+std::vector<double> sizes_along(std::span<const Touch> touches, std::size_t nodes, std::size_t rims) {
+  constexpr std::size_t kReach = 2;
+  constexpr int kRounds = 4;
+  std::vector<double> size(nodes, 1.0), level(rims);
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<double> sum(rims, 0.0), count(rims, 0.0);
+    for (const Touch& one : touches) sum[one.rim] += one.distance_mm / size[one.node], count[one.rim] += 1.0;
+    double mean = 0.0;  // of all rims alike, as the shape's own size is 1
+    for (std::size_t r = 0; r < rims; ++r) {
+      level[r] = count[r] > 0.0 ? sum[r] / count[r] : 0.0;
+      mean +=
+          level[r] / static_cast<double>(std::count_if(count.begin(), count.end(), [](double n) { return n > 0.0; }));
+    }
+    sum.assign(nodes, 0.0), count.assign(nodes, 0.0);
+    for (const Touch& one : touches)
+      for (std::size_t i = one.node < kReach ? 0 : one.node - kReach; i <= std::min(one.node + kReach, nodes - 1); ++i)
+        sum[i] += one.distance_mm * mean / level[one.rim], count[i] += 1.0;
+    double last = 0.0;
+    for (std::size_t i = 0; i < nodes && !(last > 0.0); ++i)
+      if (count[i] > 0.0) last = sum[i] / count[i];
+    for (std::size_t i = 0; i < nodes; ++i) size[i] = last = count[i] > 0.0 ? sum[i] / count[i] : last;
+  }
+  return size;
+}
+
+}  // namespace
+
 PooledSection pooled_section(std::span<const ObservedForging> observations, const JointStart& start) {
-  constexpr std::size_t kEvery = 2, kReach = 2;  // tangents are many more than a section needs
-  constexpr double kMiddle = 0.15;               // share of the length to either side
-  struct Touch {
-    Eigen::Vector2d normal;
-    double distance;
-    std::size_t node;
-  };
+  constexpr std::size_t kEvery = 2;  // tangents are many more than a section needs
+  constexpr double kMiddle = 0.15;   // share of the length to either side
   std::vector<Touch> touches;
   const std::size_t nodes = start.axis.yz_mm.size();
-  std::vector<double> sum(nodes, 0.0), count(nodes, 0.0);
-  std::size_t number = 0;
+  std::map<std::tuple<std::size_t, int, bool>, std::size_t> rims;  // by observation, camera and side
   for (std::size_t k = 0; k < observations.size(); ++k) {
     const Placement& placement = start.placements[k];
     for (const ObservedSection& section : observations[k].sections) {
@@ -73,25 +107,20 @@ PooledSection pooled_section(std::span<const ObservedForging> observations, cons
         if (!met || tangent.weight <= 0.0) continue;
         const double place = met->x_mm / start.axis.x_step_mm;
         if (!(place >= 0.0) || place > static_cast<double>(nodes - 1)) continue;
-        const auto node = static_cast<std::size_t>(std::lround(place));
-        for (std::size_t i = node < kReach ? 0 : node - kReach; i <= std::min(node + kReach, nodes - 1); ++i)
-          sum[i] += met->distance_mm, count[i] += 1.0;
-        // The middle of the forging only, as it may be twisted.
-        if (std::abs(place / static_cast<double>(nodes - 1) - 0.5) < kMiddle && number++ % kEvery == 0)
-          touches.push_back({met->normal.tail<2>().normalized(), met->distance_mm, node});
+        const std::size_t rim = rims.try_emplace({k, tangent.camera, tangent.upper}, rims.size()).first->second;
+        touches.push_back(
+            {met->normal.tail<2>().normalized(), met->distance_mm, static_cast<std::size_t>(std::lround(place)), rim});
       }
     }
   }
-  PooledSection pooled;
-  double last = 0.0;
-  for (std::size_t i = 0; i < nodes && !(last > 0.0); ++i)
-    if (count[i] > 0.0) last = sum[i] / count[i];
-  for (std::size_t i = 0; i < nodes; ++i) {
-    // Where few tangents are, their directions may be one-sided: the neighbours' size goes on.
-    if (count[i] > 0.5 * count[nodes / 2]) last = sum[i] / count[i];
-    pooled.size_mm.push_back(last);
+  PooledSection pooled{.size_mm = sizes_along(touches, nodes, rims.size()), .samples = {}};
+  std::size_t number = 0;
+  for (const Touch& one : touches) {
+    // The middle of the forging only, as it may be twisted.
+    const double place = static_cast<double>(one.node) / static_cast<double>(nodes - 1);
+    if (std::abs(place - 0.5) < kMiddle && number++ % kEvery == 0)
+      pooled.samples.push_back({one.normal, one.distance_mm / pooled.size_mm[one.node]});
   }
-  for (const Touch& one : touches) pooled.samples.push_back({one.normal, one.distance / pooled.size_mm[one.node]});
   return pooled;
 }
 

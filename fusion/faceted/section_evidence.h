@@ -16,7 +16,7 @@ inline constexpr double kRoundestFaceted = 0.025;
 
 /// All tangents as those of one section of size 1.
 struct PooledSection {
-  std::vector<double> size_mm;  ///< mean distance of the tangents, one a node of the start's axis
+  std::vector<double> size_mm;  ///< mean distance of the rims as if all were seen, one a node of the start's axis
   std::vector<SupportSample> samples;
 };
 PooledSection pooled_section(std::span<const ObservedForging> observations, const JointStart& start);

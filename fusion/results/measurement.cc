@@ -1,10 +1,11 @@
 #include "fusion/results/measurement.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

@@ -1,10 +1,11 @@
 #include "fusion/triangulate/end_planes.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Dense>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

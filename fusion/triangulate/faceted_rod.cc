@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <Eigen/Dense>
 
@@ -13,7 +14,7 @@ constexpr double kScatterShare = 0.1;  // of the radius: what rims lie off the m
 /// What one camera sees of one section: half its width, and how far the middle of its rims lies from the axis towards
 /// the upper one.
 struct Middle {
-  std::size_t sample;
+  std::size_t sample, view;
   Eigen::Vector2d towards;
   double beside_mm, half_width_mm;
 };
@@ -38,7 +39,7 @@ std::vector<Middle> middles(std::span<const CameraView> views, const AxisCurve& 
     const Rims& at = rims[r];
     if (!(at.count[0] > 0.0 && at.count[1] > 0.0)) continue;
     const double upper = at.sum[1] / at.count[1], lower = at.sum[0] / at.count[0];
-    found.push_back({r % n, at.towards, 0.5 * (upper - lower), 0.5 * (upper + lower)});
+    found.push_back({r % n, r / n, at.towards, 0.5 * (upper - lower), 0.5 * (upper + lower)});
   }
   return found;
 }
@@ -77,6 +78,33 @@ void move_axis(AxisCurve& axis, std::span<const Middle> seen, int degree, double
   axis.set_slopes();
 }
 
+/// The samples between which two views at least see both rims: what lies beyond is not for a polynomial to say.
+std::pair<std::size_t, std::size_t> told(std::span<const Middle> seen, std::size_t samples) {
+  constexpr std::size_t kTogether = 10;  // samples that share what the views see
+  std::vector<std::set<std::size_t>> views(samples / kTogether + 1);
+  for (const Middle& one : seen) views[one.sample / kTogether].insert(one.view);
+  const auto two = [](const auto& some) { return some.size() > 1; };
+  const auto first = std::find_if(views.begin(), views.end(), two);
+  if (first == views.end()) return {0, samples - 1};
+  const auto last = std::find_if(views.rbegin(), views.rend(), two).base();
+  return {kTogether * static_cast<std::size_t>(first - views.begin()),
+          std::min(kTogether * static_cast<std::size_t>(last - views.begin()), samples) - 1};
+}
+
+/// Lets the axis run straight on from samples `first` and `last` to its ends.
+void straighten_beyond(AxisCurve& axis, std::size_t first, std::size_t last) {
+  const std::size_t chord = (last - first) / 8;
+  if (chord == 0) return;
+  const auto run_on = [&](std::size_t from, std::size_t inward, std::size_t i) {
+    const Eigen::Vector2d slope =
+        (axis.yz_mm[from] - axis.yz_mm[inward]) / (static_cast<double>(from) - static_cast<double>(inward));
+    axis.yz_mm[i] = axis.yz_mm[from] + (static_cast<double>(i) - static_cast<double>(from)) * slope;
+  };
+  for (std::size_t i = 0; i < first; ++i) run_on(first, first + chord, i);
+  for (std::size_t i = last + 1; i < axis.yz_mm.size(); ++i) run_on(last, last - chord, i);
+  axis.set_slopes();
+}
+
 }  // namespace
 
 RodConsensus faceted_rod(std::span<const CameraView> views, AxisCurve start) {
@@ -89,6 +117,8 @@ RodConsensus faceted_rod(std::span<const CameraView> views, AxisCurve start) {
     double size = 0.0;
     for (const Middle& one : seen) size += one.half_width_mm / static_cast<double>(seen.size());
     move_axis(rod.axis, seen, degree, 0.02 * size);
+    const auto [first, last] = told(seen, n);
+    straighten_beyond(rod.axis, first, last);
   }
   std::vector<double> sum(n, 0.0), count(n, 0.0);
   double all = 0.0;

@@ -1,11 +1,12 @@
 #include "fusion/triangulate/first_axis.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include <Eigen/Dense>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

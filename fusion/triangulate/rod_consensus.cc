@@ -1,5 +1,4 @@
 #include "fusion/triangulate/rod_consensus.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +7,8 @@
 #include <limits>
 
 #include <Eigen/Dense>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

@@ -1,5 +1,4 @@
 #include "node/edge/level_slopes.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

@@ -1,9 +1,10 @@
 #include "node/edge/rim_haze.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

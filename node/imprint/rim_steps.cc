@@ -1,8 +1,9 @@
 #include "node/imprint/rim_steps.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

@@ -1,8 +1,9 @@
 #include "node/pose/hot_air.h"
-#include "lib/geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "lib/geometry/median.h"
 
 namespace imprint {
 namespace {

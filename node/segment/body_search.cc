@@ -133,7 +133,7 @@ void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& r
   // From a column that surely belongs to the body, and not to a jaw: as near to its middle as a bright one is.
   std::vector<double> bodies;
   for (const auto& c : body.seen.columns) bodies.push_back(c.pair.body);
-  const double usual = median_of(std::move(bodies));
+  const double usual = median(std::move(bodies));
   int inside = body.seen.columns.front().x_px, nearest = working.intensity.cols;
   const int middle = body.seen.columns[body.seen.columns.size() / 2].x_px;
   for (const auto& c : body.seen.columns)

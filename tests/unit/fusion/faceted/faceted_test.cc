@@ -100,6 +100,24 @@ TEST_CASE("faceted: one observation of a bar the rig calls square is measured, w
   CHECK(errors.rms < 6.0);
 }
 
+TEST_CASE("faceted: a bar one of whose ends two cameras hardly see is told and measured as if they did") {
+  Session session = observe_hull(edges_of({}), {.observations = 6, .noise_px = 0.15, .seed = 6});
+  for (std::size_t k = 0; k < session.imprints.size(); ++k)
+    for (std::size_t c = 0; c < 2; ++c) {
+      Imprint& imprint = session.imprints[k][c];
+      for (std::size_t i = 0; i < kImprintStations; ++i) {
+        const std::size_t from_end = i < kImprintStations / 2 ? i : kImprintStations - 1 - i;
+        if (from_end < 120) imprint.axis.weight[i] = (k % 2 == 0 ? imprint.upper : imprint.lower).weight[i] = 0.0;
+        if (from_end < 60) (k % 2 == 0 ? imprint.lower : imprint.upper).weight[i] = 0.0;
+      }
+    }
+  const auto m = fused(session);
+  REQUIRE(m);
+  CHECK(m->section_kind == SectionKind::square);
+  CHECK(width_errors(*m, {300.0, 300.0}).rms < 0.5);
+  CHECK(m->max_deflection_mm == Approx(8.0).margin(0.5));
+}
+
 TEST_CASE("faceted: a round forging stays round, out of round by 5 mm or not") {
   Rod rod = bent_rod();
   make_out_of_round(rod, 5.0, 400.0, 3);
