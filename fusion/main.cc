@@ -5,6 +5,7 @@
 #include "fusion/fusion_config.h"
 #include "fusion/fusion_line.h"
 #include "fusion/peer_log.h"
+#include "lib/access/identity.h"
 #include "lib/daemon/program.h"
 #include "lib/daemon/stop_signal.h"
 #include "lib/daemon/systemd_notice.h"
@@ -46,7 +47,7 @@ Result<Ended> serve(const Lines& lines, AccessFile& access, StopSignal& stop) {
   auto rules = access.rules();
   if (!rules) return pass_on(rules.error());
   zenoh.access = std::move(*rules);
-  const auto peers = std::make_shared<PeerLog>(access.list(), lines.front()->board());
+  const auto peers = std::make_shared<PeerLog>(access.list(), lines.front()->board(), certificate_name(zenoh.identity));
   if (!zenoh.listen.empty()) zenoh.on_peer = [peers](const PeerNotice& notice) { peers->note(notice); };
   auto transport = open_zenoh(zenoh);
   if (!transport) return pass_on(transport.error());

@@ -35,6 +35,9 @@ void PeerLog::note(const PeerNotice& notice) {
       return refused(fmt::format("{}: {}", name, notice.detail));
     case PeerNotice::Kind::handshake_refused:
       return refused("a connection: " + notice.detail);
+    case PeerNotice::Kind::not_let_in:
+      if (is_new(notice.detail)) spdlog::error("not let in at {}; own certificate {}", notice.detail, own_name_);
+      return;
   }
 }
 

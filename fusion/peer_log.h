@@ -15,7 +15,9 @@ namespace imprint {
 /// is logged once a minute: a flood must not fill the journal.
 class PeerLog {
  public:
-  PeerLog(AccessList list, LineBoard& board) : list_(std::move(list)), board_(board) {}
+  /// `own_name`: what this program calls itself to others, see certificate_name().
+  PeerLog(AccessList list, LineBoard& board, std::string own_name)
+      : list_(std::move(list)), board_(board), own_name_(std::move(own_name)) {}
 
   void note(const PeerNotice& notice);
 
@@ -25,6 +27,7 @@ class PeerLog {
 
   AccessList list_;
   LineBoard& board_;
+  std::string own_name_;
   std::mutex mutex_;
   std::map<std::string, std::chrono::steady_clock::time_point> logged_;
 };

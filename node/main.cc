@@ -5,7 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <iostream>
+#include <memory>
+#include <mutex>
 
+#include "lib/access/identity.h"
 #include "lib/daemon/program.h"
 #include "lib/daemon/stop_signal.h"
 #include "lib/daemon/systemd_notice.h"
@@ -111,12 +114,28 @@ Result<std::unique_ptr<Parts>> open_parts(const std::filesystem::path& file, con
   return parts;
 }
 
+// A router that refuses this node's certificate cannot tell its own people whose it was: the node says it here, once a
+// minute.
+ZenohConfig saying_who_does_not_let_in(ZenohConfig zenoh) {
+  if (zenoh.identity.empty()) return zenoh;
+  zenoh.on_peer = [name = certificate_name(zenoh.identity), identity = zenoh.identity.string(),
+                   due = steady_clock::time_point{},
+                   mutex = std::make_shared<std::mutex>()](const PeerNotice& notice) mutable {
+    if (notice.kind != PeerNotice::Kind::not_let_in) return;
+    const std::lock_guard lock(*mutex);
+    if (steady_clock::now() < due) return;
+    due = steady_clock::now() + std::chrono::minutes(1);
+    spdlog::error("not let in at {}; own certificate {} in {}", notice.detail, name, identity);
+  };
+  return zenoh;
+}
+
 Result<Ended> measure(const ProgramOptions& options, const toml::table& own_table, const NodeConfig& config,
                       RemoteSettings& settings, StopSignal& stop) {
   const auto parts = open_parts(options.config, config, Purpose::measure);
   if (!parts) return pass_on(parts.error());
   for (const std::string& warning : (*parts)->rig.warnings) spdlog::warn("{}", warning);
-  auto transport = open_zenoh(config.zenoh);
+  auto transport = open_zenoh(saying_who_does_not_let_in(config.zenoh));
   if (!transport) return pass_on(transport.error());
   PoseKeeper keeper;  // called by the service's one worker alone
   LastFrame last_frame;

@@ -92,12 +92,13 @@ struct AccessRule {
   std::vector<std::string> ask{};      ///< may send queries to these
 };
 
-/// What a router tells of those who connect to it.
+/// What a session tells of those who connect to it, and of who does not let it in.
 struct PeerNotice {
-  enum class Kind { connected, gone, denied, handshake_refused };
+  enum class Kind { connected, gone, denied, handshake_refused, not_let_in };
   Kind kind = Kind::connected;
   std::string name;    ///< common name of its certificate; empty: it has none, or it is not known
-  std::string detail;  ///< its address; of `denied` what it tried; of `handshake_refused` why
+  std::string detail;  ///< its address; of `denied` what it tried; of `handshake_refused` why;
+                       ///< of `not_let_in` (the TLS handshake of our own connection) where and why
 };
 /// Called on a thread of the transport, perhaps once more after the transport is closed; never blocks.
 using PeerCallback = std::function<void(const PeerNotice&)>;

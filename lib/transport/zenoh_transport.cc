@@ -165,6 +165,9 @@ class PeerReporter final : public bridge::PeerHandler {
   void on_handshake_refused(rust::Str reason) const override {
     on_peer_({PeerNotice::Kind::handshake_refused, "", std::string(reason)});
   }
+  void on_not_let_in(rust::Str endpoint, rust::Str reason) const override {
+    on_peer_({PeerNotice::Kind::not_let_in, "", std::string(endpoint) + ": " + std::string(reason)});
+  }
 
  private:
   static constexpr std::size_t kMaxRemembered = 1024;

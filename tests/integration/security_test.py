@@ -56,6 +56,7 @@ class SecurityTest(unittest.TestCase):
                 shutil.copy(line.plant.identity("cam2") / "ca.pem", foreign / "ca.pem")  # it trusts this plant's fusion
                 line.start_camera("cam2", foreign)
                 self.wait_for_log(line, "refused: a connection: invalid peer certificate: UnknownIssuer")
+                self.wait_for_log(line, f"not let in at {line.endpoint}: received fatal alert: UnknownCA; own certificate cam2.", "cam2")
                 line.wait_alive("cam1", "cam3")
                 line.end("cam2", signal.SIGKILL)
 

@@ -31,6 +31,8 @@ struct PeerHandler {
   virtual void on_denied(rust::Str id, rust::Str action, rust::Str key) const = 0;
   /// A connection ended in its TLS handshake.
   virtual void on_handshake_refused(rust::Str reason) const = 0;
+  /// A connection of this program's own did.
+  virtual void on_not_let_in(rust::Str endpoint, rust::Str reason) const = 0;
 };
 
 struct RequestHandler {

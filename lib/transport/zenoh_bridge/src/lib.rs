@@ -63,6 +63,7 @@ mod ffi {
         fn on_link(self: &PeerHandler, opened: bool, id: &str, name: &str, address: &str) -> Result<()>;
         fn on_denied(self: &PeerHandler, id: &str, action: &str, key: &str) -> Result<()>;
         fn on_handshake_refused(self: &PeerHandler, reason: &str) -> Result<()>;
+        fn on_not_let_in(self: &PeerHandler, endpoint: &str, reason: &str) -> Result<()>;
         type RequestHandler;
         fn on_request(self: &RequestHandler, request: Box<Request>) -> Result<()>;
     }

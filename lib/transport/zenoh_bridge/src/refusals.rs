@@ -1,5 +1,5 @@
-//! What Zenoh refuses it tells its log alone: this layer reads there which session was denied what, and which
-//! connections ended in their TLS handshake.
+//! What Zenoh refuses it tells its log alone: this layer reads there which session was denied what, which connections
+//! ended in their TLS handshake, and by whom this program itself was not let in.
 
 use std::{
     cell::RefCell,
@@ -19,6 +19,7 @@ use crate::ffi::PeerHandler;
 
 const ACCESS_CONTROL: &str = "zenoh::net::routing::interceptor::access_control";
 const TLS_LINKS: &str = "zenoh_link_tls";
+const CONNECTING: &str = "zenoh::net::runtime::orchestrator";
 
 static HANDLER: RwLock<Option<SharedPtr<PeerHandler>>> = RwLock::new(None);
 
@@ -27,7 +28,10 @@ pub fn report_to(handler: SharedPtr<PeerHandler>) {
 }
 
 pub fn layer<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
-    let wanted = Targets::new().with_target(ACCESS_CONTROL, Level::TRACE).with_target(TLS_LINKS, Level::WARN);
+    let wanted = Targets::new()
+        .with_target(ACCESS_CONTROL, Level::TRACE)
+        .with_target(TLS_LINKS, Level::WARN)
+        .with_target(CONNECTING, Level::DEBUG);
     Refusals.with_filter(wanted)
 }
 
@@ -42,6 +46,10 @@ impl<S: Subscriber> Layer<S> for Refusals {
         if event.metadata().target().starts_with(TLS_LINKS) {
             let reason = message.0.split(". Hint:").next().unwrap_or_default();
             crate::report("on_handshake_refused", handler.on_handshake_refused(reason));
+        } else if event.metadata().target() == CONNECTING {
+            if let Some((endpoint, reason)) = not_let_in(&message.0) {
+                crate::report("on_not_let_in", handler.on_not_let_in(endpoint, reason));
+            }
         } else if let Some((id, action, key)) = denied(&message.0) {
             crate::report("on_denied", handler.on_denied(id, action, key));
         }
@@ -57,6 +65,14 @@ impl Visit for Message {
             self.0 = format!("{value:?}");
         }
     }
+}
+
+/// Endpoint and reason of a connection of our own that ended in its TLS handshake:
+/// "Unable to connect to configured peer ENDPOINT! REASON at FILE:LINE."
+fn not_let_in(message: &str) -> Option<(&str, &str)> {
+    let (endpoint, rest) = message.strip_prefix("Unable to connect to configured peer ")?.split_once("! ")?;
+    let reason = rest.split(" at /").next()?;
+    (reason.contains("alert") || reason.contains("certificate")).then_some((endpoint, reason))
 }
 
 thread_local! {
