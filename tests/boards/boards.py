@@ -5,10 +5,11 @@ import time
 
 import gige
 import host
+import libcamera
 import update
 import vivid
 
-TESTS = {"vivid": vivid.main, "gige": gige.main, "host": host.main, "update": update.main}
+TESTS = {"vivid": vivid.main, "gige": gige.main, "libcamera": libcamera.main, "host": host.main, "update": update.main}
 
 
 def main(build, names):

@@ -24,11 +24,12 @@ def modules_in_order(kernel, names):
 
 def shared_libraries(program):
     listing = run("ldd", program, capture_output=True).stdout
-    return sorted(set(re.findall(r"(/\S+)", listing)))
+    return {library: library for library in re.findall(r"(/\S+)", listing)}
 
 
-def make_initramfs(archive, kernel, modules, programs, script):
-    """A root of busybox, kernel modules (name -> parameters), programs with their libraries, and `script` to run."""
+def make_initramfs(archive, kernel, modules, programs, script, files=None, libraries_of=shared_libraries):
+    """A root of busybox, kernel modules (name -> parameters), programs with their libraries, `files` (path in the guest
+    -> file), and `script` to run. `libraries_of` gives a program's libraries, likewise."""
     root = archive.with_suffix(".root")
     shutil.rmtree(root, ignore_errors=True)
     for folder in ("bin", "proc", "sys", "dev", "tmp", "modules"):
@@ -36,12 +37,13 @@ def make_initramfs(archive, kernel, modules, programs, script):
     shutil.copy(shutil.which("busybox"), root / "bin" / "busybox")
     for program in programs:
         shutil.copy(program, root / "bin" / program.name)
-        for library in shared_libraries(program):
-            target = root / library.lstrip("/")
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(library, target)
+        files = {**libraries_of(program), **(files or {})}
+    for place, file in (files or {}).items():
+        target = root / place.lstrip("/")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, target)
     lines = []
-    for file in modules_in_order(kernel, modules):
+    for file in modules_in_order(kernel, modules) if modules else []:
         shutil.copy(file, root / "modules")
         lines.append(f"insmod /modules/{file.name} {modules.get(file.stem.replace('-', '_'), '')}")
     (root / "run.sh").write_text(script, encoding="utf-8")

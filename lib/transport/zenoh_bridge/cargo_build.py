@@ -30,10 +30,10 @@ def cargo_version(cargo):
     return (int(found[1]), int(found[2])) if found else None
 
 
-def find_cargo():
+def find_cargo(candidates):
     """Path of a cargo that is new enough; ends the build with one line when there is none."""
     seen = []
-    for candidate in CARGO_CANDIDATES:
+    for candidate in candidates:
         path = shutil.which(candidate)
         version = cargo_version(path) if path else None
         if version and version >= OLDEST_CARGO:
@@ -47,12 +47,20 @@ def find_cargo():
 
 def run_cargo(args):
     """Builds; returns the static library, cargo's dep-info file and the folder of the generated headers."""
-    cargo = find_cargo()
-    env = dict(os.environ, CXX=args.cxx)
+    # For another machine Debian's own first: the sysroot has the standard library of its version.
+    cargo = find_cargo(reversed(CARGO_CANDIDATES) if args.target else CARGO_CANDIDATES)
+    env = dict(os.environ)
+    if args.target:
+        name = args.target.replace("-", "_")
+        env |= {f"CXX_{name}": args.cxx, f"CC_{name}": re.sub(r"g\+\+", "gcc", args.cxx),
+                f"CARGO_TARGET_{name.upper()}_RUSTFLAGS": f"--sysroot={args.sysroot}/usr"}
+    else:
+        env["CXX"] = args.cxx
     # A cargo beside its own rustc: an older pair may come first in PATH.
     env["PATH"] = os.pathsep.join([os.path.dirname(cargo), env.get("PATH", "")])
     command = [cargo, "build", "--locked", "--manifest-path", args.manifest, "--target-dir", args.target_dir,
                "--profile", args.profile, "--message-format", "json-render-diagnostics"]
+    command += ["--target", args.target] if args.target else []
     library = headers = None
     with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) as process:
         for line in process.stdout:
@@ -90,6 +98,8 @@ def main():
     parser.add_argument("--target-dir", required=True, type=os.path.abspath)
     parser.add_argument("--profile", required=True)
     parser.add_argument("--cxx", required=True, help="the C++ compiler of the project")
+    parser.add_argument("--target", help="the machine it is built for, as Rust names it (default: this one)")
+    parser.add_argument("--sysroot", help="with --target: root folder of that machine's libraries")
     parser.add_argument("--out-library", required=True, type=pathlib.Path)
     parser.add_argument("--out-header", required=True, type=pathlib.Path)
     parser.add_argument("--depfile", required=True, type=pathlib.Path)
