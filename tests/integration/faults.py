@@ -350,9 +350,34 @@ def clock_jumps(work, ready, jump_s=3600):
                 "uncertainty_s": round(clock["uncertainty_s"], 4), **account}
 
 
-def peak_mb(process):
+def memory_mb(process, field):
+    """VmRSS now, VmHWM at most so far."""
     fields = dict(line.split(":", 1) for line in pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines())
-    return int(fields["VmHWM"].split()[0]) / 1024
+    return int(fields[field].split()[0]) / 1024
+
+
+def day(work, ready, observations, pace_s, most_growth_mb=4.0):
+    """Observations one after the other at 100 times a plant's pace, health at 50 times its own: no process may grow
+    from the second quarter of the day to the last."""
+    with ReadyLine(work, ready) as line:
+        line.start_fusion()
+        line.start_nodes(*CAMERAS, health__period_s="0.1")
+        line.wait_alive(*CAMERAS)
+        used = {name: [] for name in ("fusion", *CAMERAS)}
+        begin = time.monotonic()
+        for index, session in enumerate(sessions := sessions_of(observations)):
+            line.trigger_until_taken(session)
+            for name, samples in used.items():
+                samples.append(memory_mb(line.processes[name], "VmRSS"))
+            time.sleep(max(0.0, begin + (index + 1) * pace_s - time.monotonic()))
+        line.wait_for_results(sessions)
+        taken_s = time.monotonic() - begin
+        quarter = observations // 4
+        grown = {name: statistics.median(samples[-quarter:]) - statistics.median(samples[quarter:2 * quarter])
+                 for name, samples in used.items()}
+        assert max(grown.values()) <= most_growth_mb, grown
+        return {"observations": observations, "seconds": round(taken_s),
+                **{f"{name}_mb": f"{samples[-1]:.1f} ({grown[name]:+.1f})" for name, samples in used.items()}, **line.account()}
 
 
 def hostile_client(work, ready, python, messages):
@@ -361,14 +386,14 @@ def hostile_client(work, ready, python, messages):
         line.start_all()
         line.trigger_until_taken("before")
         line.wait_for_results(["before"])
-        quiet_mb = peak_mb(line.processes["fusion"])
+        quiet_mb = memory_mb(line.processes["fusion"], "VmHWM")
         client = subprocess.run([python, HERE / "hostile_client.py", line.endpoint, str(messages),
                                  ready.folder / "obs00_cam1.imprint"], capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False)
         assert client.returncode == 0, client.stderr
         line.trigger_until_taken("after")
         line.wait_for_results(["after"])
         counters = line.status()["counters"]
-        grown_mb = peak_mb(line.processes["fusion"]) - quiet_mb
+        grown_mb = memory_mb(line.processes["fusion"], "VmHWM") - quiet_mb
         assert counters["malformed"] > 0, counters
         assert line.complete_sessions() >= {"before", "after"}
         return {"messages": messages, "fusion_grew_mb": round(grown_mb), "malformed": counters["malformed"],

@@ -49,6 +49,7 @@ FAULTS = {
     "fusion-disk": lambda work, ready, _: faults.fusion_disk_full(work, ready),
     "clocks": lambda work, ready, _: faults.clock_jumps(work, ready),
     "hostile": lambda work, ready, python: faults.hostile_client(work, ready, python, messages=100_000),
+    "day": lambda work, ready, _: faults.day(work, ready, observations=480, pace_s=1.8),
     "fuzz-wire": fuzz("wire_fuzz"),
     **{f"fuzz-{kind}": fuzz("file_fuzz", kind) for kind in ("config", "library", "field", "session", "rig", "access")},
     "fuzz-http": fuzz("http_fuzz"),
