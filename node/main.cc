@@ -1,3 +1,4 @@
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -144,6 +145,7 @@ Result<Ended> measure(const ProgramOptions& options, const toml::table& own_tabl
       config, *(*parts)->source,
       [&](const Frame& frame) {
         if ((*parts)->replay) return replayed_imprint(frame);
+        last_frame.keep(frame, {});  // not two at a time: at 16 megapixels each is 16 MB
         ProcessedFrame found = process_frame(frame, *(*parts)->camera, (*parts)->rig, (*parts)->method, &keeper);
         last_frame.keep(frame, found);
         eye.learn(found);
@@ -218,6 +220,8 @@ Result<void> run(const ProgramOptions& options, char** argv) {
 }  // namespace imprint
 
 int main(int argc, char** argv) {
+  // A frame's images go back to the system at once, rather than to heaps that keep what they have grown to.
+  ::mallopt(M_MMAP_THRESHOLD, 256 * 1024);
   imprint::ProgramOptions options;
   if (const auto status = imprint::parse_program_options(
           argc, argv, "imprint-node", "Measures what one camera sees and sends its imprints to fusion", options)) {

@@ -37,8 +37,8 @@ struct CameraSettings {
   int input = -1;             // v4l2: of a device with several; -1: as it is set
   double frames_per_s = 0.0;  // 0: as the camera is set
   CameraTrigger trigger = CameraTrigger::free_running;
-  int buffers = 6;        // the camera's own; of 16 MB each at 16 megapixels and 8 bit
-  int recent_frames = 3;  // of the buffers, kept for triggers in the near past
+  int buffers = 4;        // the camera's own; of 16 MB each at 16 megapixels and 8 bit
+  int recent_frames = 2;  // of the buffers, kept for triggers in the near past
   Exposure exposure{};    // to start with; 0: as the camera is set
   std::string exposure_control = "exposure_time_absolute";  // v4l2: its name
   double exposure_unit_us = 100.0;                          // v4l2: of that control; UVC's is 100

@@ -19,7 +19,7 @@ namespace imprint {
 
 struct LiveConfig {
   CameraTrigger trigger = CameraTrigger::free_running;
-  std::size_t recent_frames = 3;                 // kept for triggers in the near past
+  std::size_t recent_frames = 2;                 // kept for triggers in the near past
   std::chrono::milliseconds frame_wait{2000};    // a trigger's frame comes within it, or fails; ours
   std::chrono::milliseconds stall{3000};         // a running camera without a frame is opened anew
   std::chrono::milliseconds first_pause{200};    // before a lost camera is tried again; ours

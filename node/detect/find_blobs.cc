@@ -8,6 +8,7 @@ namespace imprint {
 namespace {
 
 constexpr int tile_px = 256;
+constexpr int halo_px = 8;  // further than the widest kernel and the neighbour of a maximum reach
 
 double strength(const cv::Mat& response, const cv::Point& p) {
   switch (response.depth()) {
@@ -51,21 +52,25 @@ void keep_strongest(std::vector<cv::Point>& points, std::size_t count, const cv:
 }  // namespace
 
 std::vector<cv::Point> find_blobs(const cv::Mat& level, double min_contrast, int per_tile, BlobSize size) {
-  const cv::Mat response = blob_response(level, size);
-  cv::Mat highest;
-  cv::Mat is_maximum;
-  cv::dilate(response, highest, {});
-  cv::compare(response, highest, is_maximum, cv::CMP_EQ);
-  // A dot's response is 0.35 to 0.55 of its contrast over the sizes that this level answers for.
-  cv::bitwise_and(is_maximum, response >= std::max(1.0, 0.3 * min_contrast), is_maximum);
   std::vector<cv::Point> result;
+  // One row of tiles at a time: the whole level's responses would be six more images.
   for (int y = 0; y < level.rows; y += tile_px) {
+    const int height = std::min(tile_px, level.rows - y);
+    const int top = std::max(0, y - halo_px);
+    const cv::Mat response =
+        blob_response(level.rowRange(top, std::min(level.rows, y + height + halo_px)).clone(), size);
+    cv::Mat highest;
+    cv::Mat is_maximum;
+    cv::dilate(response, highest, {});
+    cv::compare(response, highest, is_maximum, cv::CMP_EQ);
+    // A dot's response is 0.35 to 0.55 of its contrast over the sizes that this level answers for.
+    cv::bitwise_and(is_maximum, response >= std::max(1.0, 0.3 * min_contrast), is_maximum);
     for (int x = 0; x < level.cols; x += tile_px) {
-      const cv::Rect tile(x, y, std::min(tile_px, level.cols - x), std::min(tile_px, level.rows - y));
+      const cv::Rect tile(x, y - top, std::min(tile_px, level.cols - x), height);
       std::vector<cv::Point> maxima;
       cv::findNonZero(is_maximum(tile), maxima);
       keep_strongest(maxima, static_cast<std::size_t>(per_tile), response(tile));
-      for (const cv::Point& p : maxima) result.push_back(p + tile.tl());
+      for (const cv::Point& p : maxima) result.push_back(p + cv::Point(x, y));
     }
   }
   return result;

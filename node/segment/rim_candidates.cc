@@ -86,6 +86,7 @@ RimCandidates find_rim_candidates(const WorkingImage& working, const SegmentConf
   cv::GaussianBlur(working.intensity, smooth, {3, 3}, config.smoothing_sigma_px);
   cv::Sobel(smooth, gx, CV_32F, 1, 0, 3, 1.0 / 8);
   cv::Sobel(smooth, gy, CV_32F, 0, 1, 3, 1.0 / 8);
+  smooth.release();
   cv::Mat_<unsigned char> inside;
   cv::erode(working.valid, inside, cv::Mat(), {-1, -1}, 3, cv::BORDER_CONSTANT, cv::Scalar(0));
 

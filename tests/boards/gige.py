@@ -57,6 +57,13 @@ def reference(data):
     return json.loads(done.stdout)
 
 
+def take_from_cameras(line, data, frames_per_s, socket_buffer_mb):
+    """Nodes of the line take frames through Aravis, not from the folder."""
+    line.node_config.write_text(
+        line.node_config.read_text().replace('source = "folder"', 'source = "aravis"').replace(f'path = "{data}"\n', "")
+        + f"[exposure]\nauto = false\n[camera]\nframes_per_s = {frames_per_s}\nsocket_buffer_mb = {socket_buffer_mb}\npacket_bytes = 8000\n")
+
+
 def main(build):
     if os.geteuid() != 0:
         print("needs root, for network namespaces")
@@ -72,9 +79,7 @@ def main(build):
         subprocess.run([os.environ["IMPRINT"], "simulate", SCENE, "--out", data], check=True, stdout=subprocess.DEVNULL)
         expected = reference(data)
         with running_line.Line(work, data / "rig.toml", "folder", data) as line:
-            line.node_config.write_text(
-                line.node_config.read_text().replace('source = "folder"', 'source = "aravis"').replace(f'path = "{data}"\n', "")
-                + "[exposure]\nauto = false\n[camera]\nframes_per_s = 10.0\nsocket_buffer_mb = 4.0\npacket_bytes = 8000\n")
+            take_from_cameras(line, data, 10.0, 4.0)
             for camera in cameras:
                 loss = LOST_PER_MILLE if camera == cameras[-1] else 0
                 line.start(f"gige-{camera}", ["ip", "netns", "exec", f"gige-{camera}", build / "tests/boards/gige_camera", "eth0",

@@ -112,6 +112,7 @@ class TestCamera {
 
 LiveConfig quick() {
   LiveConfig config;
+  config.recent_frames = 3;
   config.frame_wait = kPatience;
   config.first_pause = milliseconds(10);
   config.last_pause = milliseconds(40);

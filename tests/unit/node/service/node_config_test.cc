@@ -94,7 +94,7 @@ TEST_CASE("node config: what a camera cannot be set to names its key") {
   REQUIRE(camera_fault("camera.format=bayer").find("camera.format: pixel format \"bayer\"") != std::string::npos);
   REQUIRE(camera_fault("camera.height_px=0").find("width_px, height_px: expected both or neither") !=
           std::string::npos);
-  REQUIRE(camera_fault("camera.recent_frames=5").find("recent_frames: expected 1 to 4") != std::string::npos);
+  REQUIRE(camera_fault("camera.recent_frames=5").find("recent_frames: expected 1 to 2") != std::string::npos);
   REQUIRE(camera_fault("camera.trigger=often").find("camera.trigger: ") != std::string::npos);
   REQUIRE(camera_fault("camera.controls=[\"gain\"]").find("expected name=value") != std::string::npos);
   REQUIRE(camera_fault("camera.buffers=1e99").find("camera.buffers: ") != std::string::npos);
