@@ -7,7 +7,7 @@ from kernel_package import run
 HERE = pathlib.Path(__file__).resolve().parent
 ESP_MB, SLOT_MB = 32, 400
 GRUB_MODULES = ("part_gpt", "fat", "squash4", "normal", "configfile", "linux", "loadenv", "test", "echo", "serial", "terminal",
-                "search", "search_label", "reboot", "boot", "regexp", "efi_gop")
+                "search", "search_label", "sleep", "reboot", "boot", "regexp", "efi_gop")
 
 
 def make_esp(image, work, board_options):

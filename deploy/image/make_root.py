@@ -129,7 +129,7 @@ def bill_of_materials(root, version, target):
 
 
 def slim(root):
-    for place in ("var/cache/apt", "var/lib/apt", "var/log", "usr/share/doc", "usr/share/man", "usr/share/locale",
+    for place in ("var/cache/apt", "var/cache/ldconfig", "var/lib/apt", "var/log", "usr/share/doc", "usr/share/man", "usr/share/locale",
                   "usr/lib/udev/hwdb.d", "usr/share/zoneinfo/right", "usr/share/zoneinfo/posix"):
         shutil.rmtree(root / place, ignore_errors=True)
     for place in ("usr/lib/udev/hwdb.bin", "usr/lib/x86_64-linux-gnu/gconv", "usr/share/grub", "usr/lib/grub"):

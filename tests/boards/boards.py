@@ -6,10 +6,13 @@ import time
 import gige
 import host
 import libcamera
+import memory
+import swap
 import update
 import vivid
 
-TESTS = {"vivid": vivid.main, "gige": gige.main, "libcamera": libcamera.main, "host": host.main, "update": update.main}
+TESTS = {"vivid": vivid.main, "gige": gige.main, "libcamera": libcamera.main, "memory": memory.main,
+         "host": host.main, "update": update.main, "swap": swap.main}
 
 
 def main(build, names):

@@ -2,6 +2,7 @@
 
 The kernel comes as Debian's package, fetched by apt once and kept in .cache/boards.
 """
+import os
 import pathlib
 import re
 import shutil
@@ -14,6 +15,15 @@ CACHE = ROOT / ".cache" / "boards"
 sys.path.insert(0, str(ROOT / "deploy" / "image"))
 import kernel_package
 from kernel_package import run
+
+
+def accelerator():
+    """KVM where the processor virtualises by itself; else emulation. A /dev/kvm without vmx or svm in /proc/cpuinfo is
+    virtualisation by software, in which Debian's kernels do not start."""
+    hardware = re.search(r"^flags\s*:.*\b(vmx|svm)\b", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    if hardware and os.access("/dev/kvm", os.R_OK | os.W_OK):
+        return ["-accel", "kvm", "-cpu", "host"]
+    return ["-accel", "tcg,thread=multi", "-cpu", "max"]
 
 
 def modules_in_order(kernel, names):
@@ -69,9 +79,8 @@ def boot(kernel, initramfs, log, timeout_s, memory="2G"):
     begin = time.monotonic()
     with log.open("wb") as out:
         subprocess.run(
-            ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", memory,
-             "-nographic", "-no-reboot", "-nic", "none", "-kernel", vmlinuz, "-initrd", initramfs,
-             "-append", "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off"],
+            ["qemu-system-x86_64", "-machine", "q35", *accelerator(), "-smp", "2", "-m", memory, "-nographic", "-no-reboot",
+             "-nic", "none", "-kernel", vmlinuz, "-initrd", initramfs, "-append", "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off"],
             stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, timeout=timeout_s, check=True)
     printed = log.read_text(encoding="utf-8", errors="replace").replace("\r\n", "\n")
     exit_line = re.search(r"GUEST-EXIT (\d+)", printed)

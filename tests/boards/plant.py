@@ -9,7 +9,11 @@ import shutil
 import signal
 import socket
 import subprocess
+import tempfile
+import threading
 import time
+
+import guest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "tests/data/small_forge.toml"
@@ -109,31 +113,63 @@ def wait_for(condition, timeout_s, what, still_there=lambda: True):
 
 
 class Board:
-    """A disk that runs in QEMU under UEFI; what it prints goes to `console`."""
+    """A disk that runs in QEMU under UEFI, with a USB stick if given; what it prints goes to `console`.
 
-    def __init__(self, disk, console, memory="1G", usb=None):
-        self.disk, self.console, self.memory, self.usb = disk, console, memory, usb
+    When the board restarts, QEMU ends and is started anew: after a warm reset OVMF takes minutes in emulation.
+    """
+
+    def __init__(self, disk, console, memory="1G"):
+        self.disk, self.console, self.memory = disk, console, memory
         self.variables = pathlib.Path(str(disk) + ".vars")
+        self.control = pathlib.Path(tempfile.gettempdir()) / f"imprint-board-{os.getpid()}.qmp"  # its path must be short
         shutil.copy("/usr/share/OVMF/OVMF_VARS_4M.fd", self.variables)
-        self.process = None
+        self.process = self.keeper = None
+        self.powered = threading.Event()
 
-    def start(self):
-        command = ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", self.memory,
-                   "-nographic", "-drive", "if=pflash,format=raw,readonly=on,file=/usr/share/OVMF/OVMF_CODE_4M.fd",
+    def launch(self, stick):
+        command = ["qemu-system-x86_64", "-machine", "q35", *guest.accelerator(), "-smp", "2", "-m", self.memory,
+                   "-nographic", "-no-reboot", "-drive", "if=pflash,format=raw,readonly=on,file=/usr/share/OVMF/OVMF_CODE_4M.fd",
                    "-drive", f"if=pflash,format=raw,file={self.variables}",
                    "-drive", f"if=none,id=disk,file={self.disk},format=raw,cache=writeback",
                    "-device", "virtio-blk-pci,drive=disk,bootindex=0", "-nic", "user,model=virtio-net-pci",
-                   "-device", "i6300esb", "-watchdog-action", "reset"]
+                   "-device", "i6300esb", "-watchdog-action", "reset", "-qmp", f"unix:{self.control},server=on,wait=off"]
+        if stick:
+            command += ["-device", "qemu-xhci", "-drive", f"if=none,id=stick,file={stick},format=raw",
+                        "-device", "usb-storage,drive=stick"]
         with self.console.open("ab") as out:
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
 
+    def start(self, stick=None):
+        def keep():
+            while self.process.wait() == 0 and self.powered.is_set():
+                self.launch(stick)
+        self.powered.set()
+        self.launch(stick)
+        self.keeper = threading.Thread(target=keep, daemon=True)
+        self.keeper.start()
+
     def running(self):
-        return self.process is not None and self.process.poll() is None
+        return self.keeper is not None and self.keeper.is_alive()
 
     def cut_power(self):
-        if self.running():
-            os.kill(self.process.pid, signal.SIGKILL)
-            self.process.wait()
+        self.powered.clear()
+        while self.running():
+            self.process.kill()
+            self.keeper.join(1)
+        self.control.unlink(missing_ok=True)
+
+    def written_bytes(self):
+        """What the board has written to its disk since it was switched on."""
+        with socket.socket(socket.AF_UNIX) as link, link.makefile("rw") as lines:
+            link.connect(str(self.control))
+            for command in ("qmp_capabilities", "query-blockstats"):
+                lines.write(json.dumps({"execute": command}) + "\n")
+            lines.flush()
+            for line in lines:
+                answer = json.loads(line).get("return")
+                if isinstance(answer, list):
+                    return next(drive["stats"]["wr_bytes"] for drive in answer if drive["device"] == "disk")
+        raise RuntimeError("QEMU ended the connection")
 
     def printed(self):
         return self.console.read_text(encoding="utf-8", errors="replace") if self.console.exists() else ""

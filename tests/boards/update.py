@@ -16,6 +16,7 @@ import plant
 
 PATIENCE_S = 120  # of a slot that is judged; the guest is emulated
 BOOT_S = 600      # on two busy cores
+SETTLE_S, REST_MIN, WRITE_LIMIT_MB = 60, 3, 1.0
 CUTS = int(os.environ.get("IMPRINT_POWER_CUTS", "2"))
 SEED = int(os.environ.get("IMPRINT_SEED", str(int(time.time()))))
 
@@ -99,11 +100,28 @@ class Cycle:
         camera, _ = plant.wait_for(seen, 300, "a frame", self.board.running)
         self.check("a triggered frame shows its targets", camera["health"]["targets_seen"] >= 10, camera["health"]["targets_seen"])
 
+    def writes_little(self):
+        time.sleep(SETTLE_S)
+        before = self.board.written_bytes()
+        time.sleep(60 * REST_MIN)
+        rate = (self.board.written_bytes() - before) / 1e6 / REST_MIN
+        self.check(f"at rest less than {WRITE_LIMIT_MB} MB a minute is written", rate < WRITE_LIMIT_MB, f"{rate:.3f} MB a minute over {REST_MIN} min")
+
     def refuses_a_stranger(self):
         done = self.update("evil.raucb", "2")
         self.check("a bundle signed by a stranger is refused", done.returncode == 1 and "signature" in done.stderr, done.stderr.strip().splitlines()[-1])
         state = self.line.firmware()
         self.check("and nothing has changed", state and state["slot"] == "A" and state["slot_good"])
+
+    def starts_without_environment(self):
+        """As when power was cut while the boot loader's environment was written."""
+        self.board.cut_power()
+        empty = self.board.console.with_name("grubenv")
+        empty.write_bytes(b"")
+        run("mcopy", "-o", "-i", f"{self.board.disk}@@1M", empty, "::grub/grubenv")
+        self.board.start()
+        state, took_s = self.wait_good()
+        self.check("without the boot loader's environment the board boots and is good", True, f"slot {state['slot']} after {took_s:.0f} s")
 
     def survives_power_cuts(self, count):
         dice = random.Random(SEED)
@@ -152,9 +170,11 @@ def main(build):
         cycle = Cycle(line, board, work)
         try:
             cycle.boots_and_measures()
+            cycle.writes_little()
             cycle.refuses_a_stranger()
             cycle.updates()
             cycle.goes_back()
+            cycle.starts_without_environment()
             cycle.survives_power_cuts(CUTS)
         except RuntimeError as error:
             cycle.check(str(error), False)
