@@ -14,8 +14,8 @@ import guest
 from guest import run
 import plant
 
-PATIENCE_S = 120  # of a slot that is judged; the guest is emulated
-BOOT_S = 600      # on two busy cores
+PATIENCE_S = 200  # of a slot that is judged; the guest is emulated
+BOOT_S = 1200     # on two busy cores
 SETTLE_S, REST_MIN, WRITE_LIMIT_MB = 60, 3, 1.0
 CUTS = int(os.environ.get("IMPRINT_POWER_CUTS", "2"))
 SEED = int(os.environ.get("IMPRINT_SEED", str(int(time.time()))))
