@@ -91,7 +91,8 @@ def add_control(root, programs, version):
 def make_deb(build, out, version):
     """Gives the package made of the programs in the build folder."""
     programs = [build / "fusion/imprint-fusion", build / "cli/imprint"]
-    epoch = os.environ.setdefault("SOURCE_DATE_EPOCH", output("git", "-C", ROOT, "log", "-1", "--format=%ct"))
+    epoch = os.environ.get("SOURCE_DATE_EPOCH") or output("git", "-C", ROOT, "log", "-1", "--format=%ct")
+    os.environ["SOURCE_DATE_EPOCH"] = epoch  # dpkg-deb's too
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as work:
         root = pathlib.Path(work) / "root"

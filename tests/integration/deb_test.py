@@ -28,6 +28,7 @@ def setUpModule():
     global work, deb, root
     work = pathlib.Path(tempfile.mkdtemp(prefix="imprint-deb-"))
     unittest.addModuleCleanup(shutil.rmtree, work, ignore_errors=True)
+    os.environ.setdefault("SOURCE_DATE_EPOCH", "1700000000")  # also where the source is no git folder
     deb = make_deb.make_deb(pathlib.Path(os.environ["IMPRINT_BUILD"]), work, "0.0.1+test")
     root = work / "root"
     output("dpkg-deb", "-x", deb, root)
