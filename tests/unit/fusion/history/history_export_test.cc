@@ -22,7 +22,7 @@ struct Elsewhere {
   std::mutex mutex;
   std::map<std::string, Rows> stores;
   int added_twice = 0;
-  bool away = false;
+  std::atomic<bool> away = false;
   bool fails_after_writing = false;  // the answer to COMMIT is lost
 
   Rows of(const std::string& store) {
