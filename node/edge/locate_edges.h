@@ -18,6 +18,7 @@ struct EdgePoint {
   double body_share = 1.0;      ///< step across the edge over that from its outside up to the body's brightness
   double outside_dip = 0.0;     ///< a strip outside it darker than the background, share of the step (`best`)
   double outside_bump = 0.0;    ///< a strip outside it brighter than the background, likewise
+  double inside_ledge = 0.0;    ///< a strip inside it darker than the body further in, likewise
 };
 
 struct LocatedEnd {

@@ -14,43 +14,49 @@ constexpr int kAlong = 8;                   // lines on either side that are ave
 constexpr double kJumpPx = 1.0;             // between neighbouring lines: another stretch begins
 constexpr int kStrip = kStripPx - kNearPx + 1;
 
-// The strip's values less what the edge's own blur puts there, and the level further out.
-struct Outside {
+// The strip's values less what the edge's own blur puts there, and the level further away from the edge.
+struct Beside {
   std::array<double, kStrip> strip{};
   double far = 0.0;
   bool known = false;
 };
 
-Outside outside_of(const ScanLines& scan, const StepEdge& edge) {
-  Outside out;
+// `way`: -1 outside the edge, 1 inside.
+Beside beside(const ScanLines& scan, const StepEdge& edge, int way) {
+  Beside seen;
   const ScanLine& line = scan.lines[edge.line];
   const float* values = scan.samples(line);
   const double position = (edge.position_px - line.first_px) / scan.spacing_px;
   const int at = static_cast<int>(std::lround(position));
   const int per_px = std::max(1, static_cast<int>(std::lround(1.0 / scan.spacing_px)));
-  if (at - kFarPx * per_px < 2 || at >= line.count) return out;
+  const auto within = [&](int i) { return i >= 0 && i < line.count; };
+  if (!within(at) || !within(at + way * (kFarPx * per_px + 2))) return seen;
   std::array<float, kFarthestPx - kFarPx + 1> far{};
   std::size_t count = 0;
-  for (int d = kFarPx; d <= kFarthestPx && at - d * per_px >= 0; ++d) far[count++] = values[at - d * per_px];
+  for (int d = kFarPx; d <= kFarthestPx && within(at + way * d * per_px); ++d)
+    far[count++] = values[at + way * d * per_px];
   const auto middle = far.begin() + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(far.begin(), middle, far.begin() + static_cast<std::ptrdiff_t>(count));
-  out.far = *middle;
+  seen.far = *middle;
   for (int d = kNearPx; d <= kStripPx; ++d) {
-    const double z = (at - d * per_px - position) * scan.spacing_px / edge.blur_px;
-    const double tail = edge.step * 0.5 * std::erfc(-z / std::numbers::sqrt2);
-    out.strip[static_cast<std::size_t>(d - kNearPx)] = values[at - d * per_px] - tail;
+    const int i = at + way * d * per_px;
+    const double z = std::abs(i - position) * scan.spacing_px / edge.blur_px;
+    const double tail = edge.step * 0.5 * std::erfc(z / std::numbers::sqrt2);
+    seen.strip[static_cast<std::size_t>(d - kNearPx)] = values[i] + way * tail;
   }
-  out.known = true;
-  return out;
+  seen.known = true;
+  return seen;
 }
 
 }  // namespace
 
 std::vector<OutsideLevel> outside_levels(const ScanLines& scan, const std::vector<StepEdge>& edges) {
   std::vector<OutsideLevel> levels(edges.size());
-  std::vector<Outside> outside;
-  outside.reserve(edges.size());
-  for (const StepEdge& edge : edges) outside.push_back(outside_of(scan, edge));
+  std::vector<Beside> outside, inside;
+  for (const StepEdge& edge : edges) {
+    outside.push_back(beside(scan, edge, -1));
+    inside.push_back(beside(scan, edge, 1));
+  }
   const auto together = [&](std::size_t a, std::size_t b) {
     const ScanLine &p = scan.lines[edges[a].line], &q = scan.lines[edges[b].line];
     const double apart = q.index - p.index;
@@ -58,22 +64,26 @@ std::vector<OutsideLevel> outside_levels(const ScanLines& scan, const std::vecto
            std::abs(edges[b].position_px - edges[a].position_px - p.slope * apart) < kJumpPx * std::abs(apart);
   };
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    std::array<double, kStrip> strip{};
-    double far = 0.0, step = 0.0, count = 0.0;
-    const auto add = [&](std::size_t k) {
-      if (!outside[k].known) return;
-      for (std::size_t d = 0; d < kStrip; ++d) strip[d] += outside[k].strip[d];
-      far += outside[k].far, step += edges[k].step, count += 1.0;
+    struct Sum {
+      std::array<double, kStrip> strip{};
+      double far = 0.0, step = 0.0;
+      void add(const Beside& seen, double edge_step) {
+        if (!seen.known) return;
+        for (std::size_t d = 0; d < kStrip; ++d) strip[d] += seen.strip[d];
+        far += seen.far, step += edge_step;
+      }
+      // Two neighbouring pixels have to agree.
+      [[nodiscard]] double off(std::size_t d) const { return (0.5 * (strip[d] + strip[d + 1]) - far) / step; }
     };
+    Sum out, in;
+    const auto add = [&](std::size_t k) { out.add(outside[k], edges[k].step), in.add(inside[k], edges[k].step); };
     add(i);
     for (std::size_t k = i; k > 0 && i - k < kAlong && together(k, k - 1); --k) add(k - 1);
     for (std::size_t k = i; k + 1 < edges.size() && k - i < kAlong && together(k, k + 1); ++k) add(k + 1);
-    if (!(count > 0.0) || !(step > 0.0)) continue;
-    // Two neighbouring pixels have to agree.
     for (std::size_t d = 0; d + 1 < kStrip; ++d) {
-      const double off = (0.5 * (strip[d] + strip[d + 1]) - far) / step;
-      levels[i].dip = std::max(levels[i].dip, -off);
-      levels[i].bump = std::max(levels[i].bump, off);
+      if (out.step > 0.0) levels[i].dip = std::max(levels[i].dip, -out.off(d));
+      if (out.step > 0.0) levels[i].bump = std::max(levels[i].bump, out.off(d));
+      if (in.step > 0.0) levels[i].ledge = std::max(levels[i].ledge, -in.off(d));
     }
   }
   return levels;

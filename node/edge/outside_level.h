@@ -11,8 +11,9 @@ namespace imprint {
 /// Outside a silhouette there is background alone; cold scale at the rim hides the true rim and shows as a strip that
 /// is darker than the background behind it, or as a faint body of its own.
 struct OutsideLevel {
-  double dip = 0.0;   ///< how far it falls below the level further out
-  double bump = 0.0;  ///< how far it rises above it
+  double dip = 0.0;    ///< how far it falls below the level further out
+  double bump = 0.0;   ///< how far it rises above it
+  double ledge = 0.0;  ///< how far a strip just inside falls below the level further in: something between both levels
 };
 
 /// One an edge, in the order of `edges`; edges whose line does not reach far enough out get zeros.

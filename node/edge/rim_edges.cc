@@ -147,7 +147,7 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
     if (!out.points.empty() && out.points.back().station_px >= station) return;
     EdgePoint point;
     point.station_px = station, point.offset_px = offset, point.sigma_px = sigma;
-    point.outside_dip = outside.dip, point.outside_bump = outside.bump;
+    point.outside_dip = outside.dip, point.outside_bump = outside.bump, point.inside_ledge = outside.ledge;
     out.points.push_back(point);
     out.step.push_back(step);
   };

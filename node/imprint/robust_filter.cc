@@ -39,7 +39,7 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
 // What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
-  constexpr double kDip = 0.03, kBump = 0.09;              // of the step: half the trust is gone
+  constexpr double kDip = 0.03, kBump = 0.09, kLedge = 0.4;  // of the step: half the trust is gone
   constexpr double kNoiseTurnDeg = 60, kMostSigma = 0.2, kFairSigma = 0.2;
   RimCurve curve;
   if (points.empty()) return curve;
@@ -63,8 +63,10 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
     // Scale that is colder than what is behind it, or glows faintly itself, lies between this edge and the true rim.
     const double by_outside =
         1.0 / (1.0 + std::pow(p.outside_dip / kDip, 2)) / (1.0 + std::pow(p.outside_bump / kBump, 2));
+    // Something between the levels of the body and the background: a beam that hugs the rim.
+    const double by_inside = 1.0 / (1.0 + std::pow(p.inside_ledge / kLedge, 4));
     curve.push_back({static_cast<double>(p.station_px), p.offset_px,
-                     by_body * by_magnitude * by_direction * by_outside / (excess * excess)});
+                     by_inside * by_body * by_magnitude * by_direction * by_outside / (excess * excess)});
   }
   return curve;
 }
