@@ -49,7 +49,7 @@ struct BoardConfig {
   std::string camera_usb_id;                   ///< "vendor:product" of a USB camera; it appears as /dev/imprint-camera
   std::string camera_keys;                     ///< further keys of [camera] and [capture] for node.toml, as TOML
   std::string sensor_overlay;                  ///< raspberry-arm64: of the CSI sensor, "imx477"
-  int memory_max_mb = 400;  ///< of the node; it takes 198 MB with frames of 16 megapixels
+  int memory_max_mb = 400;                     ///< of the node; it takes 198 MB with frames of 16 megapixels
 };
 
 /// Reads and checks the file. Fails (invalid_input) with one line: file, line, key, what was expected, what was found.

@@ -55,8 +55,8 @@ class NodeService {
   /// Sends the health record and what waits for fusion; due every `health_period_s`, and done by itself after every
   /// frame.
   void send_health();
-  /// In one line whether it does its work: begins with "good: " when its camera gives frames and the last frame, if there
-  /// was one, showed targets; else says what is missing.
+  /// In one line whether it does its work: begins with "good: " when its camera gives frames and the last frame, if
+  /// there was one, showed targets; else says what is missing.
   [[nodiscard]] std::string condition();
   /// Whether one frame has been worked on for longer than `limit`: the worker hangs.
   [[nodiscard]] bool stuck(std::chrono::seconds limit) const;

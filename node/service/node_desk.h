@@ -18,8 +18,9 @@
 namespace imprint {
 
 /// What a person may ask of a node from afar, `cam/<id>/service/...`: `config` (the settings in force), `configure`
-/// (others, checked, then on trial with the node's next start), `firmware` (the board's image) and `update` (another one), `log`, `crop` of the last frame, `bundle` (all of it
-/// for whoever helps). Documents in pieces, one thread, below everything that measures.
+/// (others, checked, then on trial with the node's next start), `firmware` (the board's image) and `update` (another
+/// one), `log`, `crop` of the last frame, `bundle` (all of it for whoever helps). Documents in pieces, one thread,
+/// below everything that measures.
 class NodeDesk {
  public:
   struct Node {
