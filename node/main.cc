@@ -145,7 +145,7 @@ Result<Ended> measure(const ProgramOptions& options, const toml::table& own_tabl
       config, *(*parts)->source,
       [&](const Frame& frame) {
         if ((*parts)->replay) return replayed_imprint(frame);
-        last_frame.keep(frame, {});  // not two at a time: at 16 megapixels each is 16 MB
+        last_frame.begin(frame);
         ProcessedFrame found = process_frame(frame, *(*parts)->camera, (*parts)->rig, (*parts)->method, &keeper);
         last_frame.keep(frame, found);
         eye.learn(found);

@@ -110,6 +110,12 @@ void LastFrame::keep(const Frame& frame, const ProcessedFrame& found) {
   seen_ = std::move(seen);
 }
 
+void LastFrame::begin(const Frame& frame) {
+  const std::lock_guard lock(mutex_);
+  if (!seen_) seen_.emplace();
+  seen_->image = frame.image, seen_->source = frame.source, seen_->sensor_time_ns = frame.sensor_time_ns;
+}
+
 Result<cv::Rect> LastFrame::part_of(const Seen& seen, const Parameters& parameters, std::string& what) {
   if (const auto region = parameters.find("region"); region != parameters.end()) {
     what = "region";

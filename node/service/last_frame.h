@@ -17,6 +17,9 @@ namespace imprint {
 class LastFrame {
  public:
   void keep(const Frame& frame, const ProcessedFrame& found);
+  /// A frame that is still being worked on, in the last one's place, as both at once would take twice the memory. The
+  /// camera stands still: until more is known, rims and targets are where the last frame showed them.
+  void begin(const Frame& frame);
 
   /// A part of the frame as a line of JSON (`{"x_px", "y_px", "width_px", "height_px", "scale", "what", "source",
   /// "sensor_time"}`, the part in pixels of the frame) and behind it a grey JPEG of at most `bytes` (500 to 65,536,

@@ -87,6 +87,20 @@ TEST_CASE("crop: it shows what it says it shows") {
   REQUIRE(corner.about["width_px"] == 50);
 }
 
+TEST_CASE("crop: a frame still being worked on is shown where the last one had its targets and rims") {
+  LastFrame last;
+  show(last, cv::Mat::zeros(1200, 1600, CV_8U));
+  Frame next;
+  next.image = cv::Mat(1200, 1600, CV_8U, cv::Scalar(90));
+  next.source = "next";
+  last.begin(next);
+  for (const Parameters& parameters : {Parameters{{"target", "7"}}, Parameters{}}) {
+    const Cut seen = cut(last, parameters);
+    CHECK(seen.about["source"] == "next");
+    CHECK(seen.picture.at<std::uint8_t>(50, 50) == Approx(90).margin(3));
+  }
+}
+
 TEST_CASE("crop: stretched, a dark part can be seen") {
   LastFrame last;
   cv::Mat image = cv::Mat::zeros(1200, 1600, CV_16U);
