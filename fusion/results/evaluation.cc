@@ -36,10 +36,31 @@ double largest_deflection(const ForgingShape& shape) {
 
 using Profile = std::array<Eigen::Vector2d, kProfilePoints>;
 
+/// Points of the surface about the section's axis, which are linear in the coefficients of its support function p:
+/// where the normal n points to theta stands p n + p' n', by theta.
 Profile profile_of(const SectionShape& section) {
+  using Coefficients = Eigen::Vector<double, 1 + 2 * kHarmonics>;
+  using Surface = Eigen::Matrix<double, 2 * kProfilePoints, 1 + 2 * kHarmonics>;
+  static const Surface surface = [] {
+    Surface rows;
+    for (int i = 0; i < kProfilePoints; ++i) {
+      const double theta = 2.0 * M_PI * i / kProfilePoints;
+      const Eigen::Vector2d normal(std::cos(theta), std::sin(theta)), along(-normal.y(), normal.x());
+      rows.col(0).segment<2>(2 * i) = normal;
+      for (int k = kFirstHarmonic; k <= kLastHarmonic; ++k) {
+        const double c = std::cos(k * theta), s = std::sin(k * theta);
+        rows.col(1 + 2 * (k - kFirstHarmonic)).segment<2>(2 * i) = c * normal - k * s * along;
+        rows.col(2 + 2 * (k - kFirstHarmonic)).segment<2>(2 * i) = s * normal + k * c * along;
+      }
+    }
+    return rows;
+  }();
+  Coefficients coefficients;
+  coefficients << section.radius_mm, section.harmonics_mm;
   Profile profile;
-  for (int i = 0; i < kProfilePoints; ++i)
-    profile[static_cast<std::size_t>(i)] = section.surface(2.0 * M_PI * i / kProfilePoints);
+  Eigen::Map<Eigen::Matrix2Xd> points(profile.front().data(), 2, kProfilePoints);
+  points.reshaped() = surface * coefficients;
+  points.colwise() += section.axis_mm;
   return profile;
 }
 
@@ -49,10 +70,10 @@ double total_indicator(const ForgingShape& shape) {
   for (const SectionShape& section : shape) {
     double nearest = 1e300, furthest = 0.0;
     for (const Eigen::Vector2d& point : profile_of(section)) {
-      const double distance = point.norm();
-      nearest = std::min(nearest, distance), furthest = std::max(furthest, distance);
+      const double square = point.squaredNorm();
+      nearest = std::min(nearest, square), furthest = std::max(furthest, square);
     }
-    most = std::max(most, furthest - nearest);
+    most = std::max(most, std::sqrt(furthest) - std::sqrt(nearest));
   }
   return most;
 }

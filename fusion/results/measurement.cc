@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <future>
 
 #include <Eigen/Eigenvalues>
 
@@ -36,9 +38,10 @@ Measurement make_measurement(const CombinedForging& forging, std::vector<Measure
   measurement.origin_world_mm = forging.origin_world_mm;
   measurement.observations = std::move(observations);
   measurement.warnings = forging.warnings;
+  auto roundness = std::async(std::launch::async, evaluate_roundness, std::cref(forging));  // half of the work
   measurement.straightness = evaluate_straightness(forging);
   measurement.diameters = evaluate_diameters(forging);
-  measurement.roundness = evaluate_roundness(forging);
+  measurement.roundness = roundness.get();
   measurement.section_kind = forging.section_kind;
   measurement.facets = forging.facets;
   measurement.shape = forging.shape;
