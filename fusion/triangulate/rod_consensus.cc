@@ -51,28 +51,29 @@ class RadiusPath {
   std::vector<double> find(const AxisCurve& axis, std::span<const RimTangent> tangents) const {
     const std::size_t n = axis.yz_mm.size();
     std::vector<Levels> reward(n, Levels::Zero()), best(n, Levels::Zero());
+    const Levels radii = Levels::LinSpaced(static_cast<float>(radius(0)), static_cast<float>(radius(kLevels - 1)));
+    const float scale = static_cast<float>(scale_mm_);
     for (const RimTangent& tangent : tangents) {
       if (!within(axis, tangent.contact.x_mm)) continue;
       const std::size_t at = sample_of(axis, tangent.contact.x_mm);
-      for (int level = 0; level < kLevels; ++level) {
-        const double z = (tangent.contact.distance_mm - radius(level)) / scale_mm_;
-        const double agreement = tangent.weight / (1.0 + z * z);
-        reward[at](level) += agreement;
-        best[at](level) = std::max(best[at](level), agreement);
-      }
+      const float distance = static_cast<float>(tangent.contact.distance_mm),
+                  weight = static_cast<float>(tangent.weight);
+      const Levels agreement = weight / (1.0F + ((distance - radii) / scale).square());
+      reward[at] += agreement;
+      best[at] = best[at].max(agreement);
     }
-    for (std::size_t i = 0; i < n; ++i) reward[i] -= (1.0 - kAlone) * best[i];
+    for (std::size_t i = 0; i < n; ++i) reward[i] -= (1.0F - kAlone) * best[i];
     return refined(best_path(reward), axis, tangents);
   }
 
  private:
   static constexpr int kLevels = 200;
   // In units of what one rim point in full agreement gives.
-  static constexpr double kStepCost = 6.0;
-  static constexpr double kLevelCost = 0.5;
-  static constexpr double kAlone = 0.1;  ///< what a rim that no other one agrees with counts: it may follow a beam
+  static constexpr float kStepCost = 6.0F;
+  static constexpr float kLevelCost = 0.5F;
+  static constexpr float kAlone = 0.1F;  ///< what a rim that no other one agrees with counts: it may follow a beam
   static constexpr int kTaper = 3;       // levels; a step changes more within a few samples
-  using Levels = Eigen::Array<double, kLevels, 1>;
+  using Levels = Eigen::Array<float, kLevels, 1>;  // thousands a forging: half the memory, twice the speed
 
   [[nodiscard]] double radius(int level) const { return low_mm_ + pitch_mm_ * level; }
 
@@ -82,14 +83,16 @@ class RadiusPath {
     Levels total = reward[0];
     for (std::size_t i = 1; i < n; ++i) {
       Eigen::Index top = 0;
-      const double stepped = total.maxCoeff(&top) - kStepCost;
+      const float stepped = total.maxCoeff(&top) - kStepCost;
       for (int level = 0; level < kLevels; ++level)
         from[i][static_cast<std::size_t>(level)] = static_cast<std::int16_t>(level);
       // Two sweeps carry every total to its neighbours for the price of the levels between.
-      const auto carry = [&](int level, int neighbour) {
-        if (total(neighbour) - kLevelCost <= total(level)) return;
-        total(level) = total(neighbour) - kLevelCost;
-        from[i][static_cast<std::size_t>(level)] = from[i][static_cast<std::size_t>(neighbour)];
+      const auto carry = [&](int level, int neighbour) {  // without a branch, which nobody could predict
+        const float carried = total(neighbour) - kLevelCost;
+        std::int16_t& origin = from[i][static_cast<std::size_t>(level)];
+        const bool better = carried > total(level);
+        origin = better ? from[i][static_cast<std::size_t>(neighbour)] : origin;
+        total(level) = better ? carried : total(level);
       };
       for (int level = 1; level < kLevels; ++level) carry(level, level - 1);
       for (int level = kLevels - 2; level >= 0; --level) carry(level, level + 1);
