@@ -173,7 +173,7 @@ BodyLevels measure_levels(const WorkingImage& working, const AxisLine& line, dou
   std::vector<float> brightness = levels.body;
   const int first = walk.last_column(inside_x_px, -1, max_gap_px, brightness);
   const int last = walk.last_column(inside_x_px, 1, max_gap_px, brightness);
-  levels.first_x_px = first, levels.last_x_px = last;
+  levels.first_x_px = first, levels.last_x_px = last, levels.inside_x_px = inside_x_px;
   levels.body = std::move(brightness);
   return levels;
 }

@@ -10,6 +10,7 @@ namespace imprint {
 struct BodyLevels {
   int first_x_px = 0;  ///< the columns over which the body goes on, scale and all
   int last_x_px = -1;
+  int inside_x_px = 0;        ///< a column that surely is the body's
   std::vector<float> body;    ///< one a column of the working image, share of full scale
   std::vector<float> ground;  ///< of the darker part of both sides
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "node/segment/body_extent.h"
+
 namespace imprint {
 namespace {
 
@@ -80,7 +82,13 @@ BodyPath trace_rims(const WorkingImage& working, const AxisLine& line, const Bod
                     const RimCandidates& rims, double width_px, double half_min_px, double half_max_px) {
   BodyPath path;
   if (levels.last_x_px < levels.first_x_px) return path;
-  const auto columns = static_cast<std::size_t>(levels.last_x_px - levels.first_x_px + 1);
+  const auto [first_x_px, last_x_px] = extent_of_body(working, line, levels, rims, width_px, half_min_px, half_max_px);
+  if (last_x_px < first_x_px) return path;
+  const auto columns = static_cast<std::size_t>(last_x_px - first_x_px + 1);
+  // Behind where its brightness ended it goes on as bright as there.
+  const auto body_at = [&](int x) {
+    return levels.body[static_cast<std::size_t>(std::clamp(x, levels.first_x_px, levels.last_x_px))];
+  };
   const auto reach = static_cast<std::size_t>(std::max(4.0, half_max_px + 1));
   const auto width = static_cast<float>(std::max(8.0, width_px));
   const float jump = kColumn * width * std::max(4.0F, kIgnored * width);
@@ -89,9 +97,9 @@ BodyPath trace_rims(const WorkingImage& working, const AxisLine& line, const Bod
   Ratings sides[2] = {Ratings(columns, std::vector<float>(reach)), Ratings(columns, std::vector<float>(reach))};
   Ratings both = sides[0];
   for (std::size_t i = 0; i < columns; ++i) {
-    const int x = levels.first_x_px + static_cast<int>(i);
+    const int x = first_x_px + static_cast<int>(i);
     const auto column = static_cast<std::size_t>(x);
-    const float body = levels.body[column], contrast = std::max(1e-4F, body - levels.ground[column]);
+    const float body = body_at(x), contrast = std::max(1e-4F, body - levels.ground[column]);
     rate_column(working, x, line.y_px(x), -1, body, contrast, rims.upper[column], width, sides[0][i]);
     rate_column(working, x, line.y_px(x), 1, body, contrast, rims.lower[column], width, sides[1][i]);
     for (std::size_t k = 0; k < reach; ++k) both[i][k] = sides[0][i][k] + sides[1][i][k];
@@ -107,11 +115,11 @@ BodyPath trace_rims(const WorkingImage& working, const AxisLine& line, const Bod
     rim[side] = best_line(sides[side], least, per_px, jump);
   }
   for (std::size_t i = 0; i < columns; ++i) {
-    const int x = levels.first_x_px + static_cast<int>(i);
+    const int x = first_x_px + static_cast<int>(i);
     const auto axis_y = static_cast<float>(line.y_px(x));
     RimPair pair;
     pair.upper_px = axis_y - rim[0][i], pair.lower_px = axis_y + rim[1][i];
-    pair.body = levels.body[static_cast<std::size_t>(x)];
+    pair.body = body_at(x);
     // At the least distance nothing spoke for any other: no rim was found.
     const bool found = pair.width_px() > 2.0F * static_cast<float>(least + 1);
     pair.weight = found ? 1.0F : 0.0F;

@@ -10,28 +10,56 @@
 namespace imprint {
 namespace {
 
+// What a body's shape and place say.
+struct BodyPlace {
+  double elongation = 0.0;  // length over width
+  double off_range = 1.0;   // how many times too wide or too narrow, at least 1
+  double off_middle = 0.0;  // of the image, 1: by `center_reach`
+};
+
+BodyPlace place_of(const BodyPath& path, const WorkingImage& working, const SegmentPrior& prior,
+                   const SegmentConfig& config) {
+  BodyPlace place;
+  const double width = path.median_width_px(), width_px = width * working.reduction;
+  place.elongation = path.length_px() / std::max(1.0, width);
+  const double low = prior.likely_min_px > 0 ? prior.likely_min_px : prior.diameter_min_px;
+  const double high = prior.likely_max_px > 0 ? prior.likely_max_px : prior.diameter_max_px;
+  place.off_range = std::max({1.0, low / width_px, width_px / high});
+  const cv::Size size = working.intensity.size();
+  double nearest = 1e18;
+  for (const auto& c : path.columns)
+    nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
+  place.off_middle = nearest / (config.center_reach * working.shorter_side_px);
+  return place;
+}
+
 // How well a body fits what is looked for, 0 to 1: proven along its length, elongated, of a likely width, and near
 // where the cameras of a rig are pointed.
 double rate_body(const BodyPath& path, const BodyProof& proof, const WorkingImage& working, const SegmentPrior& prior,
                  const SegmentConfig& config) {
   if (path.empty()) return 0.0;
-  const double width = path.median_width_px(), elongation = path.length_px() / std::max(1.0, width);
-  const double by_length = elongation / (elongation + config.half_elongation);
-
-  const double width_px = width * working.reduction;
-  const double low = prior.likely_min_px > 0 ? prior.likely_min_px : prior.diameter_min_px;
-  const double high = prior.likely_max_px > 0 ? prior.likely_max_px : prior.diameter_max_px;
-  const double off_range = std::max({1.0, low / width_px, width_px / high});
-  const double by_width = 1.0 / (off_range * off_range);
-
-  const cv::Size size = working.intensity.size();
-  double nearest = 1e18;
-  for (const auto& c : path.columns)
-    nearest = std::min(nearest, std::hypot(c.x_px - 0.5 * size.width, c.pair.middle_px() - 0.5 * size.height));
-  const double z = nearest / (config.center_reach * working.shorter_side_px);
+  const BodyPlace place = place_of(path, working, prior, config);
+  const double by_length = place.elongation / (place.elongation + config.half_elongation);
+  const double by_width = 1.0 / (place.off_range * place.off_range);
   const double solid = std::clamp((proof.filled - 0.35) / 0.35, 0.0, 1.0);
   const double by_contrast = proof.contrast / (proof.contrast + config.faint_contrast);
-  return proof.sides * solid * by_contrast * by_length * by_width / (1 + z * z);
+  return proof.sides * solid * by_contrast * by_length * by_width / (1 + place.off_middle * place.off_middle);
+}
+
+// The probability that the body is the forging and its outline right: a logistic regression over rendered frames and
+// empty halls (`./dev bench segmentation`, seeds 1 and 2). On other scenes it is a little too sure: it states 95 % of
+// what is found where 90 to 93 % is right.
+double probability_of(const BodyPath& path, const BodyProof& proof, const WorkingImage& working,
+                      const SegmentPrior& prior, const SegmentConfig& config) {
+  if (path.empty()) return 0.0;
+  constexpr double kLong = 6.0;  // widths: more does not tell
+  const BodyPlace place = place_of(path, working, prior, config);
+  const auto log_of = [](double value, double least) { return std::log(std::max(value, least)); };
+  const double logit = 6.3 + 9.9 * log_of(proof.sides, 0.05) + 6.3 * log_of(proof.filled, 0.05) +
+                       0.9 * log_of(proof.contrast, 0.002) +
+                       4.0 * std::log(std::clamp(place.elongation / kLong, 0.05, 1.0)) -
+                       20.0 * std::log(place.off_range) - 8.4 * std::log1p(place.off_middle * place.off_middle);
+  return 1.0 / (1.0 + std::exp(-logit));
 }
 
 // The level that a section must have to belong to the body: a beam that happens to go on where the forging ends is
@@ -161,6 +189,7 @@ void follow_again(FoundBody& body, const RimPairs& pairs, const RimCandidates& r
     body.axis = refined;
   }
   body.rating = rate_body(body.whole, body.proof, working, prior, config);
+  body.score = probability_of(body.whole, body.proof, working, prior, config);
 }
 
 }  // namespace

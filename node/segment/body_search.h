@@ -12,6 +12,7 @@ struct FoundBody {
   AxisLine axis;
   BodyProof proof;      ///< of `whole`
   double rating = 0.0;  ///< how well it fits what is looked for, 0 to 1
+  double score = 0.0;   ///< the probability that it is the forging and its outline right
 };
 
 /// The straight line through the middles, robust against columns that took a wrong rim: from `start`, the line that the

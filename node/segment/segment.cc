@@ -97,13 +97,13 @@ Result<void> check_body(const FoundBody& body, const WorkingImage& working, cons
     return job_failed(
         "no forging: the best body is {:.0f} px long and {:.0f} px wide; a length of {:.1f} widths is needed",
         body.whole.length_px() * r, width * r, config.min_elongation);
-  if (body.rating < config.min_score)
+  if (body.score < config.min_score)
     return job_failed(
         "no forging: the best body, at ({:.0f}, {:.0f}) px and {:.0f} x {:.0f} px large, is none with a score of "
         "{:.2f} ({:.2f} is needed): both rims seen on {:.0f} % of its length, {:.0f} % of its inside of one "
         "brightness, "
         "contrast {:.0f} of 255",
-        middle.x_px, middle.y_px, body.whole.length_px() * r, width * r, body.rating, config.min_score,
+        middle.x_px, middle.y_px, body.whole.length_px() * r, width * r, body.score, config.min_score,
         100 * body.proof.both, 100 * body.proof.filled, 255 * body.proof.contrast);
   return {};
 }
@@ -161,7 +161,7 @@ Result<Segmentation> segment_forging(const cv::Mat& image, const SegmentPrior& p
   });
   if (best == sights.end()) return pass_on(check_body(sights.front().body, sights.front().working, config).error());
   Segmentation found = describe(best->body.whole, best->body.axis, best->working, config);
-  found.score = best->body.rating;
+  found.score = best->body.score;
   found.others = find_other_bodies(best->working, best->body, prior, config);
   return found;
 }

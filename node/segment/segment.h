@@ -42,7 +42,7 @@ struct Segmentation {
   int first_station_px = 0;            ///< station of the first element of the vectors below
   std::vector<float> upper_offset_px;  ///< expected rim with the smaller offset; NaN where none was seen
   std::vector<float> lower_offset_px;
-  double score = 0.0;            ///< how sure, 0 to 1: rims and inside proven, length, contrast, width and place
+  double score = 0.0;            ///< the probability that it is the forging and its outline right
   std::vector<SeenBody> others;  ///< the largest first
 };
 

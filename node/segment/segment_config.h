@@ -25,7 +25,7 @@ struct SegmentConfig {
   double center_reach = 0.35;             // off the image's middle by this share of its shorter side counts half; ours
   double faint_contrast = 0.01;           // body over ground that counts one half, share of full scale; ours
   double min_body_level = 0.28;           // of a section, share of the body's usual level over the background; ours
-  double min_score = 0.57;                // less is no forging; ours
+  double min_score = 0.6;                 // less is no forging; ours
   double max_gap_diameters = 0.8;         // longest interruption bridged, in local diameters; ours
 
   [[nodiscard]] Result<void> validate() const;

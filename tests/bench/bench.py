@@ -10,7 +10,7 @@ calibration  tables 3 to 5 and figure 9 of paper B on rendered frames, and 200 r
 survey    60 rendered photographs of a target field, surveyed and held against the truth; only when asked for.
 edges     single points of clean straight rims beside the bound, all methods; status 1 when it is missed; only when asked for.
 segmentation  300 frames with a forging and 200 empty halls: found, said to have failed, wrong; only when asked for.
-          Takes --frames N --halls N --first I --seed S --only KIND --save DIR.
+          Takes --frames N --halls N --first I --numbers I,K,... --seed S --only KIND --save DIR --keep DIR.
 silhouettes  tables 2 to 7 of paper C on rendered scenes, all seven methods; only when asked for.
           Takes --only NAME --seed S --of N --keep DIR.
 multiview tables 1 to 4 and figure 17 of paper D on exactly known forgings, then on rendered ones; only when asked for.

@@ -34,6 +34,7 @@ struct Options {
   int halls = 200;
   int first = 0;
   std::string only, save, keep;
+  std::vector<int> numbers;
 };
 
 enum class Verdict { right, failed, wrong, not_rendered };
@@ -41,6 +42,7 @@ enum class Verdict { right, failed, wrong, not_rendered };
 struct Outcome {
   Verdict verdict = Verdict::not_rendered;
   std::string said;
+  double score = 0.0;  // stated, 0: nothing was found
   double seconds = 0.0;
 };
 
@@ -65,13 +67,14 @@ TrueRims true_rims(const Scene& scene, const Layout& layout, const BodyOutline& 
     const auto& rim = upper ? outline.upper : outline.lower;
     const auto hidden = hidden_ranges_mm(props, rim, length_mm);
     for (std::size_t i = 0; i < rim.size(); ++i) {
-      constexpr double kBorder = 4.0;
+      constexpr double kBorder = 4.0, kRounding = 1e-6;
       const double at = length_mm * static_cast<double>(i) / static_cast<double>(rim.size() - 1);
       const bool in_view = rim[i].x_px >= kBorder && rim[i].y_px >= kBorder && rim[i].x_px < model.width_px - kBorder &&
                            rim[i].y_px < model.height_px - kBorder;
-      const bool seen = in_view && std::none_of(hidden.begin(), hidden.end(), [&](const auto& range) {
-                          return at >= range.first && at <= range.second;
-                        });
+      const bool seen =
+          in_view && std::none_of(hidden.begin(), hidden.end(), [&](const auto& range) {
+            return at >= range.first - kRounding * length_mm && at <= range.second + kRounding * length_mm;
+          });
       if (i == 0) shown[0][upper] = seen;
       if (i + 1 == rim.size()) shown[1][upper] = seen;
       if (seen && i % 4 == 0) truth.seen.push_back(rim[i]), truth.upper.push_back(upper);
@@ -128,22 +131,37 @@ std::string what_is_wrong(const Segmentation& found, const TrueRims& truth) {
   return wrong;
 }
 
+// The frame about the forging, brightened and plain, and below it the same with the true rims and what was found.
 void draw(const cv::Mat& frame, const Segmentation* found, const TrueRims* truth, const std::string& path) {
-  cv::Mat picture;
-  cv::cvtColor(frame, picture, cv::COLOR_GRAY2BGR);
-  picture *= 1.5;
-  if (truth != nullptr)
-    for (const ObservedPoint& p : truth->seen)
-      cv::circle(picture, {static_cast<int>(p.x_px), static_cast<int>(p.y_px)}, 1, {0, 160, 0}, -1);
+  constexpr int kMargin = 60;
+  constexpr double kBrightest = 0.99;  // share of the pixels that stay below white
+  std::vector<cv::Point> outline, seen;
   for (std::size_t i = 0; found != nullptr && i < found->upper_offset_px.size(); ++i) {
     for (const float offset : {found->upper_offset_px[i], found->lower_offset_px[i]}) {
       if (std::isnan(offset)) continue;
       const double s = found->first_station_px + static_cast<double>(i);
-      const cv::Point at(static_cast<int>(found->origin.x_px + s * found->direction_x - offset * found->direction_y),
-                         static_cast<int>(found->origin.y_px + s * found->direction_y + offset * found->direction_x));
-      cv::circle(picture, at, 1, {0, 0, 255}, -1);
+      outline.emplace_back(static_cast<int>(found->origin.x_px + s * found->direction_x - offset * found->direction_y),
+                           static_cast<int>(found->origin.y_px + s * found->direction_y + offset * found->direction_x));
     }
   }
+  if (truth != nullptr)
+    for (const ObservedPoint& p : truth->seen) seen.emplace_back(static_cast<int>(p.x_px), static_cast<int>(p.y_px));
+  std::vector<cv::Point> all = outline;
+  all.insert(all.end(), seen.begin(), seen.end());
+  const cv::Rect whole({0, 0}, frame.size());
+  cv::Rect crop = all.empty() ? whole : cv::boundingRect(all);
+  crop = cv::Rect(crop.x - kMargin, crop.y - kMargin, crop.width + 2 * kMargin, crop.height + 2 * kMargin) & whole;
+
+  cv::Mat plain = frame(crop).clone(), sorted;
+  cv::sort(plain.reshape(1, 1), sorted, cv::SORT_EVERY_ROW | cv::SORT_ASCENDING);
+  const int brightest =
+      sorted.at<unsigned char>(static_cast<int>(kBrightest * (static_cast<double>(sorted.total()) - 1)));
+  plain.convertTo(plain, CV_8U, 255.0 / std::max(1, brightest));
+  cv::cvtColor(plain, plain, cv::COLOR_GRAY2BGR);
+  cv::Mat drawn = plain.clone(), picture;
+  for (const cv::Point& p : seen) cv::circle(drawn, p - crop.tl(), 1, {0, 160, 0}, -1);
+  for (const cv::Point& p : outline) cv::circle(drawn, p - crop.tl(), 1, {0, 0, 255}, -1);
+  cv::vconcat(plain, drawn, picture);
   cv::imwrite(path, picture);
 }
 
@@ -185,6 +203,7 @@ Outcome try_scene(const SegmentationScene& made, const std::string& name, const 
     outcome.said = scene.forging.present ? what_is_wrong(*found, truth)
                                          : fmt::format("a forging {} px long", found->upper_offset_px.size());
     outcome.verdict = outcome.said.empty() ? Verdict::right : Verdict::wrong;
+    outcome.score = found->score;
     outcome.said += fmt::format(" (score {:.2f})", found->score);
   }
   const bool bad = (outcome.verdict == Verdict::right) != scene.forging.present || outcome.verdict == Verdict::wrong;
@@ -198,14 +217,14 @@ Outcome try_scene(const SegmentationScene& made, const std::string& name, const 
 
 struct Tally {
   int right = 0, failed = 0, wrong = 0, not_rendered = 0;
-  double seconds = 0.0;
+  double score = 0.0, seconds = 0.0;  // sums
 
   void add(const Outcome& outcome) {
     right += outcome.verdict == Verdict::right;
     failed += outcome.verdict == Verdict::failed;
     wrong += outcome.verdict == Verdict::wrong;
     not_rendered += outcome.verdict == Verdict::not_rendered;
-    seconds += outcome.seconds;
+    score += outcome.score, seconds += outcome.seconds;
   }
   [[nodiscard]] int judged() const { return right + failed + wrong; }
 };
@@ -217,6 +236,9 @@ int run(const Options& options) {
     if ((options.only == "empty" && !empty) || (!options.only.empty() && options.only != "empty" && empty)) continue;
     const int wanted = empty ? options.halls : options.frames;
     for (int i = options.first; i < options.first + wanted; ++i) {
+      if (!options.numbers.empty() &&
+          std::find(options.numbers.begin(), options.numbers.end(), i) == options.numbers.end())
+        continue;
       const SegmentationScene made = segmentation_scene(options.seed, i, empty);
       if (!options.only.empty() && !empty &&
           std::find(made.kinds.begin(), made.kinds.end(), options.only) == made.kinds.end())
@@ -248,6 +270,9 @@ int run(const Options& options) {
   };
   for (const auto& [kind, tally] : by_kind) line(kind, tally);
   line("all", frames);
+  if (const int found = frames.right + frames.wrong + halls.wrong; found > 0)
+    fmt::print("of what was found {:.1f} % is right, {:.1f} % by the stated scores\n", 100.0 * frames.right / found,
+               100.0 * (frames.score + halls.score) / found);
   if (halls.judged() > 0)
     fmt::print("empty halls    {:>4} frames: a forging claimed in {}\n", halls.judged(), halls.wrong);
   const int judged = frames.judged() + halls.judged();
@@ -265,6 +290,7 @@ int main(int argc, char** argv) {
   app.add_option("--frames", options.frames, "frames with a forging")->capture_default_str();
   app.add_option("--halls", options.halls, "empty halls")->capture_default_str();
   app.add_option("--first", options.first, "number of the first of each")->capture_default_str();
+  app.add_option("--numbers", options.numbers, "only these of them")->delimiter(',');
   app.add_option("--only", options.only, "frames of this kind, or \"empty\"");
   app.add_option("--save", options.save, "folder for pictures of what went wrong (green: truth, red: found)");
   app.add_option("--keep", options.keep, "folder where rendered frames are kept, and taken from the next time");

@@ -204,6 +204,27 @@ TEST_CASE("segment: a jaw that holds an end, darker or as bright as the body, is
   }
 }
 
+TEST_CASE("segment: a jaw a little darker than the body ends it, though its arm is as wide and in line") {
+  const drawn::Body body = plain_body();
+  cv::Mat_<float> image = drawn::draw(body, kSize);
+  drawn::draw_bar(image, {650, 215, 60, 170}, 128);
+  drawn::draw_bar(image, {710, 256, 190, 88}, 124);
+  const auto found = segment_forging(drawn::expose(image, 3, 26), prior(), {});
+  REQUIRE(found);
+  const double last = found->origin.x_px + found->direction_x * (found->first_station_px + length_px(*found) - 1);
+  CHECK(last == Approx(650).margin(30));
+}
+
+TEST_CASE("segment: a body goes on behind scale that covers a whole section near its end") {
+  drawn::Body body = plain_body();
+  body.patches = {
+      {200, 255, true, 50, 30}, {200, 255, false, 50, 30}, {-40, 10, true, 40, 30}, {60, 90, false, 60, 30}};
+  const auto found = segment_forging(drawn::expose(drawn::draw(body, kSize), 3, 27), prior(), {});
+  REQUIRE(found);
+  const double last = found->origin.x_px + found->direction_x * (found->first_station_px + length_px(*found) - 1);
+  CHECK(last == Approx(750).margin(30));
+}
+
 TEST_CASE("segment: clutter that outshines and touches the body does not bend its rims") {
   drawn::Body body = plain_body();
   body.level = 60;
