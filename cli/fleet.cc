@@ -1,3 +1,4 @@
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -18,7 +19,10 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr auto kLook = seconds(2);  // between two looks at a board that changes
+// A board fetches a thin bundle's pieces from the store beside it: RAUC takes its address from the bundle's.
 constexpr const char* kBundlePath = "/bundle.raucb";
+constexpr const char* kThinBundlePath = "/bundle.thin.raucb";
+constexpr const char* kThinStorePath = "/bundle.thin.castr";
 
 struct FleetOptions {
   LineOptions line;
@@ -94,23 +98,35 @@ class BundleServer {
     std::error_code failed;
     const auto size = std::filesystem::file_size(bundle, failed);
     if (failed) return invalid_input("{}: {}", bundle, failed.message());
-    server_.Get(kBundlePath, [bundle, size](const httplib::Request&, httplib::Response& response) {
-      auto file = std::make_shared<std::ifstream>(bundle, std::ios::binary);
-      response.set_content_provider(
-          size, "application/octet-stream", [file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
-            std::vector<char> piece(std::min<std::size_t>(length, 1 << 16));
-            file->seekg(static_cast<std::streamoff>(offset));
-            file->read(piece.data(), static_cast<std::streamsize>(piece.size()));
-            return file->gcount() > 0 && sink.write(piece.data(), static_cast<std::size_t>(file->gcount()));
-          });
-    });
+    const bool thin = bundle.ends_with(".thin.raucb");
+    const auto store = std::filesystem::path(bundle).replace_extension(".castr");
+    if (thin && !server_.set_mount_point(kThinStorePath, store.string()))
+      return invalid_input("{}: expected the store of its pieces beside it, {} is no folder", bundle, store.string());
+    server_.set_logger(
+        [this](const httplib::Request&, const httplib::Response& response) { sent_bytes_ += response.body.size(); });
+    server_.Get(thin ? kThinBundlePath : kBundlePath,
+                [this, bundle, size](const httplib::Request&, httplib::Response& response) {
+                  auto file = std::make_shared<std::ifstream>(bundle, std::ios::binary);
+                  response.set_content_provider(
+                      size, "application/octet-stream",
+                      [this, file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+                        std::vector<char> piece(std::min<std::size_t>(length, 1 << 16));
+                        file->seekg(static_cast<std::streamoff>(offset));
+                        file->read(piece.data(), static_cast<std::streamsize>(piece.size()));
+                        sent_bytes_ += static_cast<std::uint64_t>(file->gcount());
+                        return file->gcount() > 0 && sink.write(piece.data(), static_cast<std::size_t>(file->gcount()));
+                      });
+                });
     if (port < 1 || port > 65'535 || !server_.bind_to_port("0.0.0.0", port))
       return job_failed("--serve: port {} cannot be opened", address.substr(colon + 1));
     thread_ = std::thread([this] { server_.listen_after_bind(); });
-    return fmt::format("http://{}:{}{}", host, port, kBundlePath);
+    return fmt::format("http://{}:{}{}", host, port, thin ? kThinBundlePath : kBundlePath);
   }
 
+  [[nodiscard]] double sent_mb() const { return 1e-6 * static_cast<double>(sent_bytes_.load()); }
+
  private:
+  std::atomic<std::uint64_t> sent_bytes_{0};
   httplib::Server server_;
   std::thread thread_;
 };
@@ -176,7 +192,9 @@ int run_update(const FleetOptions& options, bool as_json) {
   BundleServer server;
   const auto address = server.start(options.bundle, options.serve);
   if (!address) return fail(address.error());
-  return change(options, {*address, options.version, seconds(options.board_timeout_s)}, as_json);
+  const int status = change(options, {*address, options.version, seconds(options.board_timeout_s)}, as_json);
+  std::cerr << fmt::format("{:.1f} MB were fetched\n", server.sent_mb());
+  return status;
 }
 
 }  // namespace

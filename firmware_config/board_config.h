@@ -13,9 +13,10 @@ namespace imprint {
 /// What a board is built like, and so how it starts.
 enum class BoardKind {
   uefi_amd64,       ///< UEFI and GRUB
+  uefi_arm64,       ///< likewise
   raspberry_arm64,  ///< the firmware of Raspberry Pi class boards: config.txt, cmdline.txt
 };
-inline constexpr auto kBoardKinds = std::to_array<std::string_view>({"uefi-amd64", "raspberry-arm64"});
+inline constexpr auto kBoardKinds = std::to_array<std::string_view>({"uefi-amd64", "uefi-arm64", "raspberry-arm64"});
 
 enum class TimeSource {
   ntp,  ///< chrony from servers

@@ -28,6 +28,20 @@ def fetch_kernel(cache):
     return folder
 
 
+def fetch_foreign_boot(cache, architecture, suite):
+    """For another architecture, whose packages apt does not know here: kernel, busybox and GRUB in one unpacked root."""
+    folder = cache / architecture / "boot"
+    if not folder.is_dir():
+        part = folder.with_suffix(".part")
+        shutil.rmtree(part, ignore_errors=True)
+        part.parent.mkdir(parents=True, exist_ok=True)
+        run("mmdebstrap", "--quiet", f"--architectures={architecture}", "--variant=extract",
+            f"--include=linux-image-{architecture},busybox-static,grub-efi-{architecture}-bin", suite, part)
+        run("depmod", "-b", part, next((part / "lib/modules").iterdir()).name)
+        part.rename(folder)
+    return folder
+
+
 class Modules:
     """The kernel's modules and what they need."""
 

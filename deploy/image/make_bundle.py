@@ -18,6 +18,14 @@ def make_bundle(bundle, root, work, compatible, version, certificate, key):
     shutil.rmtree(folder)
 
 
+def make_thin(bundle, certificate, key):
+    """What fetches only what a board does not have: an index, and beside it the store of the root's pieces (casync)."""
+    thin = bundle.with_suffix(".thin.raucb")
+    thin.unlink(missing_ok=True)
+    shutil.rmtree(thin.with_suffix(".castr"), ignore_errors=True)
+    run("rauc", "convert", f"--cert={certificate}", f"--key={key}", f"--keyring={certificate}", bundle, thin, capture_output=True)
+
+
 def make_development_keys(folder):
     """A key to try with; a plant signs with its own, kept apart from what it builds with."""
     if (folder / "key.pem").exists():

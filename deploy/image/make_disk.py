@@ -10,8 +10,12 @@ GRUB_MODULES = ("part_gpt", "fat", "squash4", "normal", "configfile", "linux", "
                 "search", "search_label", "sleep", "reboot", "boot", "regexp", "efi_gop")
 
 
-def make_esp(image, work, board_options):
-    run("grub-mkimage", "-O", "x86_64-efi", "-o", work / "BOOTX64.EFI", "-c", HERE / "grub_early.cfg", "-p", "/grub", *GRUB_MODULES)
+LOADERS = {"amd64": ("x86_64-efi", "BOOTX64.EFI"), "arm64": ("arm64-efi", "BOOTAA64.EFI")}
+
+
+def make_esp(image, work, board_options, architecture, grub):
+    target, loader = LOADERS[architecture]
+    run("grub-mkimage", "-O", target, "-d", grub / target, "-o", work / loader, "-c", HERE / "grub_early.cfg", "-p", "/grub", *GRUB_MODULES)
     environment = work / "grubenv"
     environment.unlink(missing_ok=True)
     run("grub-editenv", environment, "create")
@@ -20,7 +24,7 @@ def make_esp(image, work, board_options):
     run("truncate", "-s", f"{ESP_MB}M", image)
     run("mkfs.vfat", "-n", "ESP", "-i", "494d5052", image, capture_output=True)
     run("mmd", "-i", image, "::EFI", "::EFI/BOOT", "::grub")
-    run("mcopy", "-i", image, work / "BOOTX64.EFI", "::EFI/BOOT/")
+    run("mcopy", "-i", image, work / loader, "::EFI/BOOT/")
     run("mcopy", "-i", image, HERE / "grub.cfg", environment, board_options, "::grub/")
 
 
@@ -36,10 +40,11 @@ def make_data(image, work, board, size_mb):
     run("mke2fs", "-q", "-t", "ext4", "-L", "data", "-E", "root_owner=0:0", "-d", tree, image, f"{size_mb}M")
 
 
-def make_disk(disk, root, work, board, board_options, data_mb):
+def make_disk(disk, root, work, board, board_options, data_mb, architecture="amd64", grub=pathlib.Path("/usr/lib/grub")):
+    """`grub`: the folder with its modules of this architecture."""
     if root.stat().st_size > SLOT_MB << 20:
         raise RuntimeError(f"the root takes {root.stat().st_size >> 20} MB, a slot has {SLOT_MB}")
-    make_esp(work / "esp.img", work, board_options)
+    make_esp(work / "esp.img", work, board_options, architecture, grub)
     make_data(work / "data.img", work, board, data_mb)
     disk.unlink(missing_ok=True)
     run("truncate", "-s", f"{ESP_MB + 2 * SLOT_MB + data_mb + 2}M", disk)

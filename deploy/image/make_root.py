@@ -8,10 +8,11 @@ import re
 import shutil
 import subprocess
 
-from kernel_package import Modules, fetch_kernel
+from kernel_package import Modules
 
 HERE = pathlib.Path(__file__).resolve().parent
 SUITE = "bookworm"
+TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}
 LEFT_OUT = ("doc", "man", "locale", "info", "lintian", "bash-completion", "zsh")
 
 
@@ -34,12 +35,12 @@ def installed(root):
     return dict(line.split("=", 1) for line in shown.split())
 
 
-def debootstrap(root, lock):
-    """Installs the packages; with a lock exactly its versions."""
+def debootstrap(root, lock, architecture):
+    """Installs the packages; with a lock exactly its versions. Those of another architecture are set up in qemu-user."""
     wanted = [f"{name}={lock[name]}" if lock else name for name in listed("packages.txt")]
     excluded = [f"--dpkgopt=path-exclude=/usr/share/{folder}/*" for folder in LEFT_OUT]
     mirror = os.environ.get("IMPRINT_DEBIAN_MIRROR")
-    run("mmdebstrap", "--quiet", "--variant=minbase", "--aptopt=APT::Install-Recommends \"false\"", *excluded,
+    run("mmdebstrap", "--quiet", f"--architectures={architecture}", "--variant=minbase", "--aptopt=APT::Install-Recommends \"false\"", *excluded,
         "--include=" + ",".join(wanted), SUITE, root, *([mirror] if mirror else []))
     for name in listed("dropped.txt"):
         run("dpkg", f"--root={root}", "--purge", "--force-depends", "--force-remove-essential", name,
@@ -64,12 +65,12 @@ TO_THE_ROOT = ("virtio_pci", "virtio_blk", "nvme", "ahci", "sd_mod", "xhci_pci",
                "mmc_block", "squashfs")
 
 
-def make_initrd(kernel, target):
+def make_initrd(kernel, busybox, target):
     root = target.with_suffix(".initrd")
     shutil.rmtree(root, ignore_errors=True)
     for folder in ("bin", "dev", "proc", "sys", "root", "modules"):
         (root / folder).mkdir(parents=True)
-    shutil.copy(shutil.which("busybox"), root / "bin/busybox")
+    shutil.copy(busybox, root / "bin/busybox")
     shutil.copy(HERE / "initrd.sh", root / "init")
     (root / "init").chmod(0o755)
     modules = Modules(kernel)
@@ -77,13 +78,13 @@ def make_initrd(kernel, target):
     for file in files:
         shutil.copy(modules.folder / file, root / "modules")
     (root / "modules.list").write_text("".join(pathlib.Path(file).name + "\n" for file in files))
-    epoch = os.environ["SOURCE_DATE_EPOCH"]
-    run("sh", "-c", f"find . -exec touch -hd @{epoch} {{}} + && find . -print0 | LC_ALL=C sort -z | "
+    # One time for all commits: the same kernel gives the same initrd, and an update need not fetch it.
+    run("sh", "-c", f"find . -exec touch -hd @0 {{}} + && find . -print0 | LC_ALL=C sort -z | "
         f"cpio --quiet --reproducible -o0 -R 0:0 -H newc | gzip -9n >'{target}'", cwd=root)
     shutil.rmtree(root)
 
 
-def add_kernel(root, kernel):
+def add_kernel(root, kernel, busybox):
     modules = Modules(kernel)
     target = root / "usr/lib/modules" / modules.folder.name
     for file in modules.below(listed("modules.txt")):
@@ -94,15 +95,17 @@ def add_kernel(root, kernel):
     run("depmod", "-b", root, modules.folder.name)
     (root / "boot").mkdir(exist_ok=True)
     shutil.copy(next((kernel / "boot").glob("vmlinuz-*")), root / "boot/vmlinuz")
-    make_initrd(kernel, root / "boot/initrd")
+    make_initrd(kernel, busybox, root / "boot/initrd")
 
 
-def add_own(root, programs, version, keyring):
+def add_own(root, programs, version, keyring, architecture):
     shutil.copytree(HERE / "root", root, dirs_exist_ok=True, symlinks=True)
     for program in programs:
-        run("strip", "-o", root / "usr/bin" / program.name, program)
+        run(f"{TRIPLETS[architecture]}-strip", "-o", root / "usr/bin" / program.name, program)
     for folder in ("data", "boot/efi", "etc/rauc"):
         (root / folder).mkdir(parents=True, exist_ok=True)
+    rauc = root / "etc/rauc/system.conf"
+    rauc.write_text(rauc.read_text().replace("ARCHITECTURE", architecture))
     shutil.copy(keyring, root / "etc/rauc/keyring.pem")
     (root / "etc/imprint-version").write_text(version + "\n")
     (root / "etc/machine-id").write_text("uninitialized\n")
@@ -128,11 +131,11 @@ def bill_of_materials(root, version, target):
     target.write_text("\n".join(lines))
 
 
-def slim(root):
+def slim(root, architecture):
     for place in ("var/cache/apt", "var/cache/ldconfig", "var/lib/apt", "var/log", "usr/share/doc", "usr/share/man", "usr/share/locale",
                   "usr/lib/udev/hwdb.d", "usr/share/zoneinfo/right", "usr/share/zoneinfo/posix"):
         shutil.rmtree(root / place, ignore_errors=True)
-    for place in ("usr/lib/udev/hwdb.bin", "usr/lib/x86_64-linux-gnu/gconv", "usr/share/grub", "usr/lib/grub"):
+    for place in ("usr/lib/udev/hwdb.bin", f"usr/lib/{TRIPLETS[architecture]}/gconv", "usr/share/grub", "usr/lib/grub"):
         shutil.rmtree(root / place) if (root / place).is_dir() else (root / place).unlink(missing_ok=True)
     for program in (root / "usr/bin").glob("grub-*"):  # of GRUB's tools RAUC uses one
         if program.name != "grub-editenv":
@@ -141,17 +144,17 @@ def slim(root):
         (root / folder).mkdir(parents=True, exist_ok=True)
 
 
-def make_root(work, cache, architecture, programs, version, keyring):
+def make_root(work, kernel, busybox, architecture, programs, version, keyring):
     """Gives the squashfs; beside it the bill of materials and the size of its content in MB."""
     root = work / "root"
     shutil.rmtree(root, ignore_errors=True)
     lock = locked(architecture)
-    debootstrap(root, lock)
+    debootstrap(root, lock, architecture)
     check_lock(root, lock, architecture)
     bill_of_materials(root, version, work / "sbom.spdx")
-    slim(root)
-    add_kernel(root, fetch_kernel(cache))
-    add_own(root, programs, version, keyring)
+    slim(root, architecture)
+    add_kernel(root, kernel, busybox)
+    add_own(root, programs, version, keyring, architecture)
     return pack_root(root, work / "root.squashfs")
 
 

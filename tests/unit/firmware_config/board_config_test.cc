@@ -123,6 +123,10 @@ TEST_CASE("board: a Raspberry Pi class board gets its firmware's files instead o
   CHECK_FALSE(files.contains("boot/efi/grub/board.cfg"));
 }
 
+TEST_CASE("board: with UEFI an arm64 board gets the files of an amd64 one") {
+  CHECK(files_of(with("uefi-amd64", "uefi-arm64")) == files_of(with("uefi-amd64", "uefi-amd64")));
+}
+
 TEST_CASE("board: what is wrong is one line with its key, and what was expected") {
   CHECK(fault(with("\"uefi-amd64\"", "\"toaster\"")).find("board.kind: expected") != std::string::npos);
   CHECK(fault(with("10.0.0.12/24", "10.0.0.300/24")) ==
