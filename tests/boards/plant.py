@@ -27,16 +27,20 @@ def free_port():
 
 
 class Plant:
-    def __init__(self, build, folder):
+    def __init__(self, build, folder, kept=False):
+        """`kept`: the authority and the port of the plant that was there before, whose boards are to find it again."""
         self.build, self.folder = pathlib.Path(build).resolve(), pathlib.Path(folder)
-        self.port = free_port()
-        self.certs = self.folder / "certs"
+        self.certs, self.rig = self.folder / "certs", self.folder / "rig"
         self.fusion = None
+        if kept:
+            self.port = int((self.folder / "port").read_text())
+            return
+        self.port = free_port()
+        (self.folder / "port").write_text(str(self.port))
         shutil.rmtree(self.certs, ignore_errors=True)
         self.imprint("certs", "init", "--plant", "forge", "--dir", self.certs)
         self.issue("fusion", "fusion", "--host", "127.0.0.1", "--host", HOST_IN_GUEST)
         self.issue("engineer", "engineer")
-        self.rig = self.folder / "rig"
         if not (self.rig / "session.toml").exists():
             self.imprint("simulate", SCENE, "--out", self.rig)
 
@@ -54,7 +58,7 @@ class Plant:
         """Options that make a command speak to this line as its engineer."""
         return ("--connect", f"tls/127.0.0.1:{self.port}", "--identity", self.certs / "issued/engineer")
 
-    def board_folder(self, camera="cam1"):
+    def board_folder(self, camera="cam1", kind="uefi-amd64"):
         folder = self.folder / f"board-{camera}"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
@@ -62,7 +66,7 @@ class Plant:
         shutil.copytree(self.certs / "issued" / camera, folder / "identity")
         shutil.copytree(self.rig, folder / "rig")
         (folder / "board.toml").write_text(
-            f'[board]\nkind = "uefi-amd64"\ncamera_id = "{camera}"\n[network]\naddress = "dhcp"\ndns = []\n'
+            f'[board]\nkind = "{kind}"\ncamera_id = "{camera}"\n[network]\naddress = "dhcp"\ndns = []\n'
             f'[time]\nservers = ["{HOST_IN_GUEST}"]\n[fusion]\nconnect = ["tls/{HOST_IN_GUEST}:{self.port}"]\n'
             '[camera]\nsource = "folder"\n')
         return folder
@@ -112,26 +116,45 @@ def wait_for(condition, timeout_s, what, still_there=lambda: True):
     raise RuntimeError(f"not within {timeout_s} s: {what}")
 
 
+# By architecture: QEMU, UEFI's code and its variables.
+MACHINES = {
+    "amd64": (["qemu-system-x86_64", "-machine", "q35", *guest.accelerator()], "/usr/share/OVMF/OVMF_CODE_4M.fd", "/usr/share/OVMF/OVMF_VARS_4M.fd"),
+    "arm64": (["qemu-system-aarch64", "-machine", "virt", "-accel", "tcg,thread=multi", "-cpu", "cortex-a72"],
+              "/usr/share/AAVMF/AAVMF_CODE.fd", "/usr/share/AAVMF/AAVMF_VARS.fd"),
+}
+
+
 class Board:
     """A disk that runs in QEMU under UEFI, with a USB stick if given; what it prints goes to `console`.
 
     When the board restarts, QEMU ends and is started anew: after a warm reset OVMF takes minutes in emulation.
     """
 
-    def __init__(self, disk, console, memory="1G"):
-        self.disk, self.console, self.memory = disk, console, memory
+    def __init__(self, disk, console, memory="1G", recorded=False, architecture="amd64"):
+        """`recorded`: what is written to the disk goes to `logs` too, one file a start (power_cut.py)."""
+        self.disk, self.console, self.memory, self.recorded = disk, console, memory, recorded
+        self.logs = []
         self.variables = pathlib.Path(str(disk) + ".vars")
         self.control = pathlib.Path(tempfile.gettempdir()) / f"imprint-board-{os.getpid()}.qmp"  # its path must be short
-        shutil.copy("/usr/share/OVMF/OVMF_VARS_4M.fd", self.variables)
+        self.machine, self.firmware, variables = MACHINES[architecture]
+        shutil.copy(variables, self.variables)
         self.process = self.keeper = None
         self.powered = threading.Event()
 
+    def disk_option(self):
+        file = f"driver=file,filename={self.disk}"
+        if not self.recorded:
+            return f"node-name=disk,{file}"
+        log = pathlib.Path(f"{self.disk}.log{len(self.logs)}")
+        log.write_bytes(b"")
+        self.logs.append(log)
+        return f"node-name=disk,driver=blklogwrites,file.{file.replace(',', ',file.')},log.driver=file,log.filename={log}"
+
     def launch(self, stick):
-        command = ["qemu-system-x86_64", "-machine", "q35", *guest.accelerator(), "-smp", "2", "-m", self.memory,
-                   "-nographic", "-no-reboot", "-drive", "if=pflash,format=raw,readonly=on,file=/usr/share/OVMF/OVMF_CODE_4M.fd",
+        command = [*self.machine, "-smp", "2", "-m", self.memory,
+                   "-nographic", "-no-reboot", "-drive", f"if=pflash,format=raw,readonly=on,file={self.firmware}",
                    "-drive", f"if=pflash,format=raw,file={self.variables}",
-                   "-drive", f"if=none,id=disk,file={self.disk},format=raw,cache=writeback",
-                   "-device", "virtio-blk-pci,drive=disk,bootindex=0", "-nic", "user,model=virtio-net-pci",
+                   "-blockdev", self.disk_option(), "-device", "virtio-blk-pci,drive=disk,bootindex=0", "-nic", "user,model=virtio-net-pci",
                    "-device", "i6300esb", "-watchdog-action", "reset", "-qmp", f"unix:{self.control},server=on,wait=off"]
         if stick:
             command += ["-device", "qemu-xhci", "-drive", f"if=none,id=stick,file={stick},format=raw",
@@ -168,7 +191,7 @@ class Board:
             for line in lines:
                 answer = json.loads(line).get("return")
                 if isinstance(answer, list):
-                    return next(drive["stats"]["wr_bytes"] for drive in answer if drive["device"] == "disk")
+                    return next(drive["stats"]["wr_bytes"] for drive in answer if drive.get("node-name") == "disk")
         raise RuntimeError("QEMU ended the connection")
 
     def printed(self):
