@@ -19,6 +19,7 @@ struct EdgePoint {
   double outside_dip = 0.0;     ///< a strip outside it darker than the background, share of the step (`best`)
   double outside_bump = 0.0;    ///< a strip outside it brighter than the background, likewise
   double inside_ledge = 0.0;    ///< a strip inside it darker than the body further in, likewise
+  double blur_excess = 0.0;     ///< how much wider it is than the region's edges, share of their blur (`best`)
 };
 
 struct LocatedEnd {

@@ -135,6 +135,7 @@ double body_share(const cv::Mat& image, const SilhouetteFrame& frame, const Expe
 struct PlacedEdge {
   double station_px, offset_px, sigma_px;
   float step;
+  double blur_excess;
   OutsideLevel outside;
 };
 
@@ -143,19 +144,20 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
   constexpr double kMaxApartPx = 1.8, kMaxJumpPx = 3.0;
   std::sort(placed.begin(), placed.end(),
             [](const PlacedEdge& a, const PlacedEdge& b) { return a.station_px < b.station_px; });
-  const auto add = [&](int station, double offset, double sigma, float step, const OutsideLevel& outside) {
+  const auto add = [&](int station, const PlacedEdge& edge) {
     if (!out.points.empty() && out.points.back().station_px >= station) return;
     EdgePoint point;
-    point.station_px = station, point.offset_px = offset, point.sigma_px = sigma;
-    point.outside_dip = outside.dip, point.outside_bump = outside.bump, point.inside_ledge = outside.ledge;
+    point.station_px = station, point.offset_px = edge.offset_px, point.sigma_px = edge.sigma_px;
+    point.outside_dip = edge.outside.dip, point.outside_bump = edge.outside.bump;
+    point.inside_ledge = edge.outside.ledge, point.blur_excess = edge.blur_excess;
     out.points.push_back(point);
-    out.step.push_back(step);
+    out.step.push_back(edge.step);
   };
   for (std::size_t k = 0; k < placed.size(); ++k) {
     const PlacedEdge& a = placed[k];
     const double whole = std::round(a.station_px);
     if (std::abs(a.station_px - whole) < 1e-6) {
-      add(static_cast<int>(whole), a.offset_px, a.sigma_px, a.step, a.outside);
+      add(static_cast<int>(whole), a);
       continue;
     }
     if (k + 1 == placed.size()) break;
@@ -164,8 +166,11 @@ void place_at_stations(std::vector<PlacedEdge> placed, RimEdges& out) {
     if (apart > kMaxApartPx || std::abs(b.offset_px - a.offset_px) > kMaxJumpPx) continue;
     for (int s = static_cast<int>(std::ceil(a.station_px)); s < b.station_px - 1e-6; ++s) {
       const double t = (s - a.station_px) / apart;
-      add(s, a.offset_px + t * (b.offset_px - a.offset_px), std::hypot((1 - t) * a.sigma_px, t * b.sigma_px),
-          static_cast<float>((1 - t) * a.step + t * b.step), t < 0.5 ? a.outside : b.outside);
+      PlacedEdge between = t < 0.5 ? a : b;
+      between.offset_px = a.offset_px + t * (b.offset_px - a.offset_px);
+      between.sigma_px = std::hypot((1 - t) * a.sigma_px, t * b.sigma_px);
+      between.step = static_cast<float>((1 - t) * a.step + t * b.step);
+      add(s, between);
     }
   }
 }
@@ -195,8 +200,8 @@ RimEdges find_rim_edges(const cv::Mat& image, const SilhouetteFrame& frame, cons
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const StepEdge& edge = edges[i];
     const ObservedPoint p = scan.at(scan.lines[edge.line], edge.position_px);
-    placed.push_back(
-        {frame.station_px(p), frame.offset_px(p), edge.sigma_px, static_cast<float>(edge.step), outside[i]});
+    placed.push_back({frame.station_px(p), frame.offset_px(p), edge.sigma_px, static_cast<float>(edge.step),
+                      edge.blur_excess, outside[i]});
   }
   RimEdges out;
   place_at_stations(std::move(placed), out);

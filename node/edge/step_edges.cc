@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "lib/geometry/median.h"
+#include "node/edge/blur_excess.h"
 #include "node/edge/level_slopes.h"
 
 namespace imprint {
@@ -141,7 +142,8 @@ StepFits fit_shapes(const ScanLines& scan, const std::vector<TracedEdge>& traced
     const auto fit = fit_step(scan.samples(line) + window.from, window.count,
                               traced[i].edge.position_px - line.first_px - window.from, shapes[i]);
     if (!fit) continue;
-    fits.edges.push_back({traced[i].line, line.first_px + window.from + fit->position, 0.0, fit->step, shapes[i].blur});
+    fits.edges.push_back(
+        {traced[i].line, line.first_px + window.from + fit->position, 0.0, fit->step, shapes[i].blur, 0.0});
     fits.lines.push_back({line.index, scan.samples(line) + window.from, window.count, *fit, shapes[i]});
   }
   return fits;
@@ -157,7 +159,7 @@ double usual_noise(const std::vector<FittedLine>& lines) {
 }  // namespace
 
 std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<TracedEdge>& traced, int region_lines) {
-  constexpr int kSlopeLines = 14;
+  constexpr int kSlopeLines = 14, kBlurLines = 8;
   if (traced.empty()) return {};
   const auto lines = static_cast<std::size_t>(std::max(16, region_lines));
   const std::vector<EdgeShape> shapes = shapes_at_edges(region_shapes(scan, traced, lines), traced.size(), lines);
@@ -167,12 +169,14 @@ std::vector<StepEdge> fit_step_edges(const ScanLines& scan, const std::vector<Tr
   std::vector<StepEdge>& edges = fits.edges;
   if (edges.empty()) return {};
   const std::vector<double> shifts = shifts_by_slopes(fits.lines, kSlopeLines);
+  const std::vector<double> excess = blur_excess(fits.lines, kBlurLines);
   // A handful of samples tells little about the noise: the rim's common noise is the floor.
   std::vector<double> residuals;
   for (const FittedLine& line : fits.lines) residuals.push_back(line.fit.residual);
   const double common = median(residuals);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     edges[i].position_px += shifts[i];
+    edges[i].blur_excess = excess[i];
     edges[i].sigma_px = fits.lines[i].fit.sigma_unit * std::max(common, fits.lines[i].fit.residual);
   }
   return std::move(edges);

@@ -12,8 +12,9 @@ struct StepEdge {
   std::size_t line = 0;  ///< index into ScanLines::lines
   double position_px = 0.0;
   double sigma_px = 0.0;
-  double step = 0.0;     ///< share of full scale
-  double blur_px = 1.0;  ///< standard deviation, where it was fitted
+  double step = 0.0;         ///< share of full scale
+  double blur_px = 1.0;      ///< standard deviation, where it was fitted
+  double blur_excess = 0.0;  ///< how much wider the edge is hereabouts, share of that blur
 };
 
 /// How far to either side of a traced edge a step of that blur (px) is fitted, where no other edge is nearer. The

@@ -36,10 +36,25 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
   return unrest;
 }
 
+// How much wider the edge is than its region's, at each point or near it: the strip that widens it thins out beyond
+// where it is seen.
+std::vector<double> blur_excess_near(const std::vector<EdgePoint>& points) {
+  constexpr int kReach = 16;  // stations
+  constexpr double kShare = 0.6;
+  std::vector<double> excess(points.size());
+  for (std::size_t i = 0, first = 0; i < points.size(); ++i) {
+    while (points[first].station_px < points[i].station_px - kReach) ++first;
+    for (std::size_t k = first; k < points.size() && points[k].station_px <= points[i].station_px + kReach; ++k)
+      excess[i] = std::max(excess[i], (k == i ? 1.0 : kShare) * points[k].blur_excess);
+  }
+  return excess;
+}
+
 // What the point's own looks say: a weak edge, one that lies among restless directions or a bad fit counts less.
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
   constexpr double kDip = 0.03, kBump = 0.09, kLedge = 0.4;  // of the step: half the trust is gone
+  constexpr double kBlurExcess = 0.3;                        // of the blur, likewise
   constexpr double kNoiseTurnDeg = 60, kMostSigma = 0.2, kFairSigma = 0.2;
   RimCurve curve;
   if (points.empty()) return curve;
@@ -49,7 +64,7 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
     magnitudes.push_back(p.magnitude), directions.push_back(p.direction_deg), sigmas.push_back(p.sigma_px);
   }
   const double magnitude = median(magnitudes), direction = median(directions), sigma = std::max(1e-4, median(sigmas));
-  const std::vector<double> unrest = direction_unrest(points, direction);
+  const std::vector<double> unrest = direction_unrest(points, direction), wider = blur_excess_near(points);
   // Of the calmer part of the rim: scale may border more than half of it.
   const double calm_deg = std::max(1.0, quantile(unrest, 0.3));
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -65,8 +80,10 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
         1.0 / (1.0 + std::pow(p.outside_dip / kDip, 2)) / (1.0 + std::pow(p.outside_bump / kBump, 2));
     // Something between the levels of the body and the background: a beam that hugs the rim.
     const double by_inside = 1.0 / (1.0 + std::pow(p.inside_ledge / kLedge, 4));
+    // Two steps close together pass for a wider one.
+    const double by_blur = 1.0 / (1.0 + std::pow(wider[i] / kBlurExcess, 4));
     curve.push_back({static_cast<double>(p.station_px), p.offset_px,
-                     by_inside * by_body * by_magnitude * by_direction * by_outside / (excess * excess)});
+                     by_blur * by_inside * by_body * by_magnitude * by_direction * by_outside / (excess * excess)});
   }
   return curve;
 }

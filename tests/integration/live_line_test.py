@@ -222,6 +222,7 @@ class LiveLineTest(unittest.TestCase):
             self.assertEqual(line.stored("SELECT count(*) FROM message"), [(0,)])
             for observation in (0, 1):
                 name = f"obs{observation:02}_cam1.png"
+                time.sleep(2 * SANITIZED_FACTOR)  # turned as it is, it counts anew once it was out of sight for hold_s
                 shutil.copy(data / name, images / "coming.png")
                 (images / "coming.png").rename(images / name)
                 status = line.wait_for(lambda status: status["last_result"] and len(status["session"]["observations"]) == observation + 1
