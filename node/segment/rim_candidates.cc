@@ -29,8 +29,7 @@ cv::Mat_<unsigned char> clean_mask(const cv::Mat& weak, const cv::Mat& strong, i
   cv::Mat opened;
   cv::morphologyEx(strong, opened, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, {run, 1}));
   cv::Mat_<int> label;
-  cv::Mat stats, centroids;
-  const int count = cv::connectedComponentsWithStats(weak, label, stats, centroids, 8, CV_32S);
+  const int count = cv::connectedComponents(weak, label, 8, CV_32S);
   std::vector<unsigned char> keep(static_cast<std::size_t>(count), 0);
   for (int y = 0; y < label.rows; ++y) {
     const unsigned char* on = opened.ptr<unsigned char>(y);
