@@ -39,12 +39,14 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
 // How much wider the edge is than its region's, at each point or near it: the strip that widens it thins out beyond
 // where it is seen.
 std::vector<double> blur_excess_near(const std::vector<EdgePoint>& points) {
-  constexpr int kReach = 16;  // stations
+  constexpr double kReach = 0.011;  // of the rim's length
   constexpr double kShare = 0.6;
+  if (points.empty()) return {};
+  const double reach = kReach * (points.back().station_px - points.front().station_px);
   std::vector<double> excess(points.size());
   for (std::size_t i = 0, first = 0; i < points.size(); ++i) {
-    while (points[first].station_px < points[i].station_px - kReach) ++first;
-    for (std::size_t k = first; k < points.size() && points[k].station_px <= points[i].station_px + kReach; ++k)
+    while (points[first].station_px < points[i].station_px - reach) ++first;
+    for (std::size_t k = first; k < points.size() && points[k].station_px <= points[i].station_px + reach; ++k)
       excess[i] = std::max(excess[i], (k == i ? 1.0 : kShare) * points[k].blur_excess);
   }
   return excess;
