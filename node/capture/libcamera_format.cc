@@ -94,6 +94,10 @@ double gain_factor(double gain_db) { return std::pow(10.0, gain_db / 20.0); }
 
 double gain_db(double factor) { return factor > 0.0 ? 20.0 * std::log10(factor) : 0.0; }
 
+bool is_picture(libcamera::FrameMetadata::Status status) {
+  return status == libcamera::FrameMetadata::FrameSuccess || status == libcamera::FrameMetadata::FrameError;
+}
+
 Exposure exposure_of(const libcamera::ControlList& metadata, const Exposure& asked) {
   Exposure exposure = asked;
   if (const auto time_us = metadata.get(libcamera::controls::ExposureTime)) exposure.time_us = *time_us;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <libcamera/controls.h>
+#include <libcamera/framebuffer.h>
 #include <libcamera/pixel_format.h>
 
 #include "lib/result/result.h"
@@ -29,6 +30,10 @@ Result<libcamera::ControlValue> libcamera_control_value(const libcamera::Control
 /// libcamera's gain is a factor.
 double gain_factor(double gain_db);
 double gain_db(double factor);
+
+/// Whether it is a picture of the camera's, be it damaged: not one that was cancelled, nor one taken while the camera
+/// settles, which newer versions hand over (FrameStartup) and older ones kept back.
+bool is_picture(libcamera::FrameMetadata::Status status);
 
 /// What the camera says of the exposure of a frame; what it does not say is that of `asked`.
 Exposure exposure_of(const libcamera::ControlList& metadata, const Exposure& asked);

@@ -145,12 +145,19 @@ Result<std::optional<LibcameraFrame>> LibcameraQueue::next(std::chrono::millisec
   if (completed_.empty()) return std::nullopt;
   const std::size_t index = completed_.front();
   completed_.pop_front();
-  return frame_of(index);
+  if (is_picture(metadata_of(slots_.at(index)).status)) return frame_of(index);
+  lock.unlock();
+  give_back(index);
+  return std::nullopt;
+}
+
+const libcamera::FrameMetadata& LibcameraQueue::metadata_of(const Slot& slot) {
+  return slot.request->buffers().begin()->second->metadata();
 }
 
 LibcameraFrame LibcameraQueue::frame_of(std::size_t index) {
   Slot& slot = slots_.at(index);
-  const libcamera::FrameMetadata& metadata = slot.request->buffers().begin()->second->metadata();
+  const libcamera::FrameMetadata& metadata = metadata_of(slot);
   const auto planes = metadata.planes();
   LibcameraFrame taken;
   RawFrame& frame = taken.frame;

@@ -72,6 +72,7 @@ class LibcameraQueue : public std::enable_shared_from_this<LibcameraQueue> {
   Result<void> allocate(libcamera::Stream* stream, std::size_t least);
   int give(Slot& slot);  // with the lock held
   void give_back(std::size_t index);
+  static const libcamera::FrameMetadata& metadata_of(const Slot& slot);
   LibcameraFrame frame_of(std::size_t index);
 
   const std::shared_ptr<libcamera::Camera> camera_;

@@ -77,6 +77,13 @@ TEST_CASE("libcamera: a frame's exposure is what the camera says of it, else wha
   CHECK(exposure_of(said, asked).gain_db == Approx(20.0));
 }
 
+TEST_CASE("libcamera: a damaged frame is a picture, one of a camera that still settles or was cancelled is not") {
+  CHECK(is_picture(libcamera::FrameMetadata::FrameSuccess));
+  CHECK(is_picture(libcamera::FrameMetadata::FrameError));
+  CHECK_FALSE(is_picture(libcamera::FrameMetadata::FrameCancelled));
+  CHECK_FALSE(is_picture(static_cast<libcamera::FrameMetadata::Status>(3)));  // FrameStartup; 0.0.3 has no name for it
+}
+
 TEST_CASE("libcamera: a camera that is not there is an error that names it, time after time") {
   CameraSettings settings;
   settings.device = "/base/no/such/camera";
