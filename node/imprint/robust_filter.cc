@@ -36,18 +36,24 @@ std::vector<double> direction_unrest(const std::vector<EdgePoint>& points, doubl
   return unrest;
 }
 
-// How much wider the edge is than its region's, at each point or near it: the strip that widens it thins out beyond
-// where it is seen.
-std::vector<double> blur_excess_near(const std::vector<EdgePoint>& points) {
-  constexpr double kReach = 0.011;  // of the rim's length
-  constexpr double kShare = 0.6;
-  if (points.empty()) return {};
-  const double reach = kReach * (points.back().station_px - points.front().station_px);
+// How much wider the edge is than its region's: at the widest place that is near and that only wider points lie
+// between, for a strip beside the rim begins and ends too thin to show.
+std::vector<double> widest_near(const std::vector<EdgePoint>& points) {
+  constexpr double kWider = 0.05, kReach = 0.012;  // of the blur; of the rim's length
   std::vector<double> excess(points.size());
-  for (std::size_t i = 0, first = 0; i < points.size(); ++i) {
-    while (points[first].station_px < points[i].station_px - reach) ++first;
-    for (std::size_t k = first; k < points.size() && points[k].station_px <= points[i].station_px + reach; ++k)
-      excess[i] = std::max(excess[i], (k == i ? 1.0 : kShare) * points[k].blur_excess);
+  if (points.empty()) return excess;
+  const double reach = kReach * (points.back().station_px - points.front().station_px);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto is_one_with = [&](std::size_t k) {
+      return points[k].blur_excess > kWider && std::abs(points[k].station_px - points[i].station_px) <= reach;
+    };
+    excess[i] = std::max(0.0, points[i].blur_excess);
+    for (std::size_t k = i; is_one_with(k); --k) {
+      excess[i] = std::max(excess[i], points[k].blur_excess);
+      if (k == 0) break;
+    }
+    for (std::size_t k = i; k < points.size() && is_one_with(k); ++k)
+      excess[i] = std::max(excess[i], points[k].blur_excess);
   }
   return excess;
 }
@@ -56,7 +62,7 @@ std::vector<double> blur_excess_near(const std::vector<EdgePoint>& points) {
 RimCurve rated_curve(const std::vector<EdgePoint>& points) {
   constexpr double kDarkShare = 0.25, kBrightShare = 0.5;  // of the body's brightness: beams behind it, and its own rim
   constexpr double kDip = 0.03, kBump = 0.09, kLedge = 0.4;  // of the step: half the trust is gone
-  constexpr double kBlurExcess = 0.3;                        // of the blur, likewise
+  constexpr double kBlurExcess = 0.35;                       // of the blur, likewise
   constexpr double kNoiseTurnDeg = 60, kMostSigma = 0.2, kFairSigma = 0.2;
   RimCurve curve;
   if (points.empty()) return curve;
@@ -66,7 +72,7 @@ RimCurve rated_curve(const std::vector<EdgePoint>& points) {
     magnitudes.push_back(p.magnitude), directions.push_back(p.direction_deg), sigmas.push_back(p.sigma_px);
   }
   const double magnitude = median(magnitudes), direction = median(directions), sigma = std::max(1e-4, median(sigmas));
-  const std::vector<double> unrest = direction_unrest(points, direction), wider = blur_excess_near(points);
+  const std::vector<double> unrest = direction_unrest(points, direction), wider = widest_near(points);
   // Of the calmer part of the rim: scale may border more than half of it.
   const double calm_deg = std::max(1.0, quantile(unrest, 0.3));
   for (std::size_t i = 0; i < points.size(); ++i) {
