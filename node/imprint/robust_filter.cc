@@ -6,6 +6,7 @@
 
 #include "node/imprint/rim_agreement.h"
 #include "node/imprint/rim_steps.h"
+#include "node/imprint/trusted_runs.h"
 
 namespace imprint {
 namespace {
@@ -150,16 +151,6 @@ RimCurve local_regression(const RimCurve& curve, const std::vector<double>& cuts
   return out;
 }
 
-// A few trusted stations alone among untrusted ones are there by chance.
-void drop_short_runs(RimCurve& curve, std::size_t least_run) {
-  for (std::size_t begin = 0; begin < curve.size();) {
-    std::size_t end = begin;
-    while (end < curve.size() && curve[end].weight > 0) ++end;
-    for (std::size_t i = begin; i < end && end - begin < least_run; ++i) curve[i].weight = 0.0;
-    begin = std::max(end, begin + 1);
-  }
-}
-
 // Finite offsets where nothing is trusted: on the line between the trusted neighbours.
 void bridge_untrusted(RimCurve& curve) {
   std::size_t before = curve.size();
@@ -195,12 +186,13 @@ FilteredCurves robust_filter(const Silhouette& silhouette, const FilterConfig& c
   // A rim is held against the others' in the fusion, an axis is not.
   constexpr double kLeastRimTrust = 0.2, kLeastAxisTrust = 0.35;
   FilteredCurves out;
-  const RimCurve axis = middle_of(upper, lower);
   out.upper = local_regression(upper, upper_cuts, config.best_rim_window, noise_upper, kLeastRimTrust);
   out.lower = local_regression(lower, lower_cuts, config.best_rim_window, noise_lower, kLeastRimTrust);
-  out.axis = local_regression(axis, {}, config.best_axis_window, rim_noise_px(axis), kLeastAxisTrust);
   const auto least_run = static_cast<std::size_t>(config.min_trusted_run);
   drop_short_runs(out.upper, least_run), drop_short_runs(out.lower, least_run);
+  drop_islands(out.upper, 1.0, upper), drop_islands(out.lower, -1.0, lower);
+  const RimCurve axis = middle_of(upper, lower);
+  out.axis = local_regression(axis, {}, config.best_axis_window, rim_noise_px(axis), kLeastAxisTrust);
   bridge_untrusted(out.upper), bridge_untrusted(out.lower), bridge_untrusted(out.axis);
   return out;
 }
