@@ -95,7 +95,8 @@ double gain_factor(double gain_db) { return std::pow(10.0, gain_db / 20.0); }
 double gain_db(double factor) { return factor > 0.0 ? 20.0 * std::log10(factor) : 0.0; }
 
 bool is_picture(libcamera::FrameMetadata::Status status) {
-  return status == libcamera::FrameMetadata::FrameSuccess || status == libcamera::FrameMetadata::FrameError;
+  constexpr int kStartup = 3;  // FrameStartup, which older headers do not name
+  return status != libcamera::FrameMetadata::FrameCancelled && static_cast<int>(status) != kStartup;
 }
 
 Exposure exposure_of(const libcamera::ControlList& metadata, const Exposure& asked) {

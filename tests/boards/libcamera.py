@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """libcamera in guests: tests/boards/libcamera_test.cc with Debian 12's 0.0.3 and the kernel's vimc driver, built here as
-Debian does not ship it, and with 0.7 of Debian 13's backports and its virtual pipeline.
+Debian does not ship it, and with Debian 13's 0.4 and its backports' 0.7, which have a virtual pipeline.
 """
 import pathlib
 import re
@@ -13,12 +13,22 @@ import guest
 TIMEOUT_S = 900
 LIBRARIES = "usr/lib/x86_64-linux-gnu"
 VIMC = "drivers/media/test-drivers/vimc"
-VIRTUAL_CAMERA = """%YAML 1.1
+VIRTUAL_CAMERAS = """%YAML 1.1
 ---
 "Virtual0":
   supported_formats:
   - width: 4656
     height: 3520
+    frame_rates:
+    - 30
+    - 60
+  test_pattern: "bars"
+  location: "CameraLocationFront"
+  model: "Virtual Video Device"
+"Virtual1":
+  supported_formats:
+  - width: 1280
+    height: 720
     frame_rates:
     - 30
     - 60
@@ -60,16 +70,16 @@ def old_libcamera(build):
         guest.shared_libraries
 
 
-def fetch_new_libcamera():
-    """Debian 13's kernel, and libcamera of its backports with all that needs."""
-    root = guest.CACHE / "libcamera-0.7"
+def fetch_new_libcamera(version, suite):
+    """Debian 13's kernel, and libcamera with all that needs."""
+    root = guest.CACHE / f"libcamera-{version}"
     if root.is_dir():
         return root
     part = root.with_suffix(".part")
     shutil.rmtree(part, ignore_errors=True)
     listed = guest.run("apt-cache", "policy", capture_output=True).stdout
     mirror = re.search(r"(https?://\S+) \w+/main", listed).group(1)
-    wanted = [f"{name}/trixie-backports" for name in ("libcamera-dev", "libcamera-ipa", "libcamera0.7")]
+    wanted = [f"{name}/{suite}" for name in ("libcamera-dev", "libcamera-ipa", f"libcamera{version}")]
     guest.run("mmdebstrap", "--quiet", "--variant=extract", "--include=" + ",".join([*wanted, "linux-image-amd64"]), "", part,
               f"deb {mirror} trixie main", f"deb {mirror} trixie-backports main")
     for file in (part / LIBRARIES / "pkgconfig").glob("libcamera*.pc"):
@@ -78,10 +88,10 @@ def fetch_new_libcamera():
     return root
 
 
-def new_libcamera(build):
-    """0.7: the same sources compiled with its headers, its libraries and those they need from Debian 13."""
-    root = fetch_new_libcamera()
-    folder = guest.CACHE / "libcamera-0.7-build"
+def new_libcamera(version, suite, tests):
+    """The same sources compiled with this version's headers, its libraries and those they need from Debian 13."""
+    root = fetch_new_libcamera(version, suite)
+    folder = guest.CACHE / f"libcamera-{version}-build"
     if not (folder / "build.ninja").exists():
         guest.run("meson", "setup", folder, guest.ROOT, f"-Dpkg_config_path={root / LIBRARIES / 'pkgconfig'}",
                   "-Dcpp_link_args=-Wl,--allow-shlib-undefined", stdout=subprocess.DEVNULL)
@@ -93,23 +103,30 @@ def new_libcamera(build):
         listing = guest.run(loader, "--library-path", f"{root / LIBRARIES}:/{LIBRARIES}:/lib/x86_64-linux-gnu", "--list", file,
                             capture_output=True).stdout
         found = dict(re.findall(r"(\S+) => (/\S+)", listing))
-        if not str(found["libcamera.so.0.7"]).startswith(str(root)):
-            raise RuntimeError(f"{file}: expected libcamera 0.7 of {root}, found {found['libcamera.so.0.7']}")
+        if not str(found[f"libcamera.so.{version}"]).startswith(str(root)):
+            raise RuntimeError(f"{file}: expected libcamera {version} of {root}, found {found[f'libcamera.so.{version}']}")
         return {f"/{LIBRARIES}/{name}": place for name, place in found.items() if not name.startswith("/")}
 
-    camera = guest.CACHE / "virtual.yaml"
-    camera.write_text(VIRTUAL_CAMERA)
-    files = {"/lib64/ld-linux-x86-64.so.2": loader, "/usr/share/libcamera/pipeline/virtual/virtual.yaml": camera}
-    return root, {}, [program], f"{program.name} --use-colour no --durations yes '[virtual]'\n", files, libraries_of
+    cameras = guest.CACHE / "virtual.yaml"
+    cameras.write_text(VIRTUAL_CAMERAS)
+    files = {"/lib64/ld-linux-x86-64.so.2": loader, "/usr/share/libcamera/pipeline/virtual/virtual.yaml": cameras}
+    return root, {}, [program], f"{program.name} --use-colour no --durations yes '{tests}'\n", files, libraries_of
+
+
+VERSIONS = {
+    "0.0.3 with vimc": old_libcamera,
+    "0.4 with its virtual pipeline": lambda _: new_libcamera("0.4", "trixie", "[virtual]~[counts]"),  # which says neither time nor sequence
+    "0.7 with its virtual pipeline": lambda _: new_libcamera("0.7", "trixie-backports", "[virtual]"),
+}
 
 
 def main(build):
     status = 0
-    for name, prepare in (("0.0.3 with vimc", old_libcamera), ("0.7 with its virtual pipeline", new_libcamera)):
+    for name, prepare in VERSIONS.items():
         kernel, *content = prepare(build)
         archive = guest.CACHE / "libcamera.cpio.gz"
         guest.make_initramfs(archive, kernel, *content)
-        printed, code, took_s = guest.boot(kernel, archive, guest.CACHE / f"libcamera-{prepare.__name__}.log", TIMEOUT_S)
+        printed, code, took_s = guest.boot(kernel, archive, guest.CACHE / f"libcamera-{name.split()[0]}.log", TIMEOUT_S)
         print(printed if code != 0 else printed[printed.rfind("====") :].strip())
         print(f"libcamera {name}: status {code} after {took_s:.0f} s")
         status = status or (0 if code == 0 else 1)

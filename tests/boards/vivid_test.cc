@@ -4,6 +4,8 @@
 #include <linux/videodev2.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include <catch2/catch.hpp>
@@ -76,6 +78,13 @@ void inject(const std::string& control, std::int64_t value) {
   auto device = open_v4l2_device("/dev/video0");
   REQUIRE(device);
   REQUIRE(V4l2Controls(*device).set(control, value));
+}
+
+// "unbind" takes the camera away, its device file with it; "bind" brings it back.
+void tell_driver(const std::string& what) {
+  std::ofstream file("/sys/bus/platform/drivers/vivid/" + what);
+  file << "vivid.0" << std::flush;
+  REQUIRE(file.good());
 }
 
 }  // namespace
@@ -154,6 +163,28 @@ TEST_CASE("vivid: a camera that is unplugged and plugged in again gives frames a
   CHECK(source->status()->restarts >= 1);
   frame_of(*source);
   CHECK(source->status()->fault.empty());
+}
+
+TEST_CASE("vivid: a camera that is unplugged and stays away is a fault by name, and gives frames when it is back") {
+  CameraSettings settings = sixteen_megapixels(PixelFormat::mono8, kBlack);
+  settings.input = 0;
+  settings.width_px = 640;
+  settings.height_px = 360;
+  const auto source = open(settings);
+  frame_of(*source);
+  tell_driver("unbind");
+  const auto deadline = steady_clock::now() + kPatience;
+  const auto waits = [&] { return source->status()->fault.find("No such file") == std::string::npos; };
+  while (waits() && steady_clock::now() < deadline) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK_THAT(source->status()->fault, Catch::Contains("/dev/video0"));
+  CHECK_FALSE(std::filesystem::exists("/dev/video0"));
+  const auto refused = source->capture({});
+  REQUIRE_FALSE(refused);
+  CHECK_THAT(refused.error().message, Catch::Contains("/dev/video0"));
+  tell_driver("bind");
+  frame_of(*source);
+  CHECK(source->status()->fault.empty());
+  CHECK(source->status()->restarts >= 1);
 }
 
 TEST_CASE("vivid: an error when streaming begins, and a buffer with an error, are survived") {
