@@ -30,7 +30,7 @@ class JointSolver {
         step_mm_(start.x_step_mm),
         length_mm_(start.x_step_mm * static_cast<double>(start.yz_mm.size() - 1)),
         radius_mm_(median({start_radius_mm.begin(), start_radius_mm.end()})),
-        end_margin_(1.0 + 2.0 * shift_sigma_mm / start.x_step_mm),
+        end_margin_mm_(end_margin_mm(step_mm_, shift_sigma_mm, radius_mm_)),
         prior_(unseen_steps(observations, start_radius_mm, start.x_step_mm), start.x_step_mm, radius_mm_,
                config.out_of_round_share, config.out_of_round_length_share * length_mm_),
         tangents_(tangent_rows(observations)),
@@ -120,7 +120,7 @@ class JointSolver {
     equations.clear();
     equations.reserve(tangents_.rows.size());
     for (TangentRow& row : tangents_.rows) {
-      equations.push_back(equation_of(row, places_, rod, length_mm_, end_margin_ * step_mm_));
+      equations.push_back(equation_of(row, places_, rod, length_mm_, end_margin_mm_));
       if (equations.back()) equations.back()->extra_variance_mm2 = shoulder_variance_mm2(*equations.back());
     }
     if (!(noise_scale_ > 0.0)) noise_scale_ = std::max(kLeastNoise, first_scatter(equations));
@@ -231,7 +231,7 @@ class JointSolver {
   double step_mm_;
   double length_mm_;
   double radius_mm_;
-  double end_margin_;  ///< nodes next to an end whose tangents may belong to the end circle instead
+  double end_margin_mm_;
   SectionPrior prior_;
   TangentRows tangents_;
   ViewerPlaces places_;

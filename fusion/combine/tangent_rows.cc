@@ -74,6 +74,11 @@ std::optional<TangentEquation> equation_of(TangentRow& row, const ViewerPlaces& 
   return equation;
 }
 
+double end_margin_mm(double step_mm, double end_sigma_mm, double radius_mm) {
+  constexpr double kMost = 0.2;  // of the radius
+  return step_mm + std::min(2.0 * end_sigma_mm, kMost * radius_mm);
+}
+
 double rim_scatter(const TangentRows& tangents, std::span<const std::optional<double>> off_mm) {
   constexpr std::size_t kApart = 8;  // stations: some 25 px
   std::vector<double> bends;

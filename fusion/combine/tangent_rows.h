@@ -51,6 +51,10 @@ std::optional<TangentEquation> equation_of(TangentRow& row, const ViewerPlaces& 
 void set_place_effects(PlacedEquation& equation, const Eigen::Vector3d& center_mm, const Eigen::Vector3d& point_mm,
                        const Eigen::Vector3d& surface_normal, double length_mm);
 
+/// How far from either end a tangent may belong to the end's outline instead: by how well the ends are known, but not
+/// the whole forging where they are not.
+double end_margin_mm(double step_mm, double end_sigma_mm, double radius_mm);
+
 /// Scatter of the tangents along their rims, in their stated sigmas: from second differences wide enough to see what
 /// haze and filtering move together. `off_mm`: of each row from what the estimate starts with, where it has a say; the
 /// estimate itself could bend to the tangents until none scatter.

@@ -54,8 +54,8 @@ class FacetedSolver {
         axis_(start.axis),
         step_mm_(start.axis.x_step_mm),
         length_mm_(step_mm_ * static_cast<double>(sections.size() - 1)),
-        end_margin_mm_(step_mm_ + 2.0 * start.shift_sigma_mm),
         size_mm_(0.5 * measures_of(sections[sections.size() / 2], kind)(kMeanWidth)),
+        end_margin_mm_(end_margin_mm(step_mm_, start.shift_sigma_mm, size_mm_)),
         start_radius_mm_(std::max(sections[sections.size() / 2].radius_mm, 0.02 * size_mm_)),
         tangents_(tangent_rows(observations)),
         places_(tangents_.viewers, start.placements, length_mm_, size_mm_, start.shift_sigma_mm, config),
@@ -293,7 +293,7 @@ class FacetedSolver {
 
   CombineConfig config_;
   AxisCurve axis_;  ///< of the start: what the corners go along with
-  double step_mm_, length_mm_, end_margin_mm_, size_mm_, start_radius_mm_;
+  double step_mm_, length_mm_, size_mm_, end_margin_mm_, start_radius_mm_;
   TangentRows tangents_;
   ViewerPlaces places_;
   std::shared_ptr<System> system_;

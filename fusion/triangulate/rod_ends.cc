@@ -123,15 +123,20 @@ RodEnds find_ends(std::span<const CameraView> views, const RodConsensus& rod, st
     std::vector<Candidate> all = candidates(views, rod, end_section_mm, out_of_round_share, last);
     double widest_sigma = 0.0;
     for (const Candidate& one : all) widest_sigma = std::max(widest_sigma, one.reading.sigma_mm);
-    const std::span<Candidate> group = largest_group(all, std::max(0.04 * radius, 4.0 * widest_sigma), stop);
-    // Rims that run on well past every reading: what was read is not the end.
-    const auto past = [&](double x_mm) { return last ? stop - x_mm : x_mm - stop; };
-    if (group.size() == 1 && past(group[0].x_mm) > 0.25 * radius) {
-      ends.warnings.push_back(
-          fmt::format("camera {}: the {} end it reads lies {:.0f} mm inside where the rims stop; it "
-                      "is not believed",
-                      ids[static_cast<std::size_t>(group[0].reading.camera)], name, past(group[0].x_mm)));
-      continue;
+    const double tolerance = std::max(0.04 * radius, 4.0 * widest_sigma);
+    std::span<Candidate> group = largest_group(all, tolerance, stop);
+    // Rims that run on well past a reading that no other one bears out: what was read is not the end.
+    const auto past = [&](const Candidate& one) { return last ? stop - one.x_mm : one.x_mm - stop; };
+    if (group.size() == 1) {
+      std::erase_if(all, [&](const Candidate& one) {
+        if (!(past(one) > 0.25 * radius)) return false;
+        ends.warnings.push_back(
+            fmt::format("camera {}: the {} end it reads lies {:.0f} mm inside where the rims stop; it "
+                        "is not believed",
+                        ids[static_cast<std::size_t>(one.reading.camera)], name, past(one)));
+        return true;
+      });
+      group = largest_group(all, tolerance, stop);
     }
     double doubt = 0.0;
     for (const Candidate& one : all) {

@@ -1,4 +1,5 @@
 #include "fusion/combine/combine.h"
+#include "fusion/combine/tangent_rows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -197,6 +198,11 @@ TEST_CASE("combine: scale over 15 % of every rim leaves 0.5 mm of axis and 0.5 m
     CHECK(d.diameter_best90_rms < 0.5);
     CHECK(std::abs(d.length) < 1.5);
   }
+}
+
+TEST_CASE("combine: an end that nobody knows does not take the rims beside it") {
+  CHECK(end_margin_mm(3.8, 1.0, 130.0) == Approx(5.8));
+  CHECK(end_margin_mm(3.8, 250.0, 130.0) < 30.0);
 }
 
 TEST_CASE("combine: an end whose rims nobody sees has wide intervals, which hold a hidden shoulder, and a warning") {

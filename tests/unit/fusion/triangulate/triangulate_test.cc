@@ -271,6 +271,19 @@ TEST_CASE("triangulate: one end misread by 40 mm in one of three cameras moves t
   CHECK(std::abs(length_of(*observed) - 1900.0) < 1.0);
 }
 
+TEST_CASE("triangulate: of two readings of an end the one that other rims run past is not believed, nor doubt left") {
+  std::vector<Imprint> imprints = three();
+  imprints[0].start.visible = false;
+  imprints[2].start.station_px += 200.0;  // 250 mm inside, as where scale covers the end
+  const auto observed = triangulate_all(imprints);
+  REQUIRE(observed.has_value());
+  CHECK(std::abs(length_of(*observed) - 1900.0) < 1.0);
+  CHECK(observed->length_sigma_mm < 3.0);
+  REQUIRE(observed->warnings.size() == 1);
+  CHECK(observed->warnings[0].find("cam3") != std::string::npos);
+  CHECK(observed->warnings[0].find("inside where the rims stop") != std::string::npos);
+}
+
 TEST_CASE("triangulate: a wrong config is refused by its key") {
   TriangulateConfig config;
   CHECK(config.validate().has_value());
