@@ -1,4 +1,5 @@
 """Debian's kernel: its package, fetched by apt and unpacked, and the modules in it with what they need."""
+import fcntl
 import pathlib
 import re
 import shutil
@@ -12,7 +13,14 @@ def run(*command, **options):
 
 
 def fetch_kernel(cache):
-    """The unpacked package of the release's kernel."""
+    """The unpacked package of the release's kernel. One at a time."""
+    cache.mkdir(parents=True, exist_ok=True)
+    with (cache / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return unpacked_kernel(cache)
+
+
+def unpacked_kernel(cache):
     depends = run("apt-cache", "depends", KERNEL, capture_output=True).stdout
     package = re.search(r"Depends: (linux-image-\S+)", depends).group(1)
     folder = cache / package

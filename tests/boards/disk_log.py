@@ -90,12 +90,14 @@ class Replay:
         self.number, self.entries = -1, iter(())
         self.ahead = None      # read, but behind the last moment
         self.in_cache = []     # written since the last flush
+        self.flushed = 0       # writes before that
 
     def flush(self):
         with self.durable.open("r+b") as disk:
             for entry in self.in_cache:
                 disk.seek(entry.offset)
                 disk.write(entry.data)
+        self.flushed += len(self.in_cache)
         self.in_cache = []
 
     def take(self, entry):
@@ -122,12 +124,13 @@ class Replay:
                 self.take(entry)
 
     def cut(self, moment, disk: pathlib.Path):
-        """Writes `disk`; gives how many writes were in the cache, and how many of them are lost."""
+        """Writes `disk`; gives how many writes were in the cache, how many of them are lost, and which writes the disk has: two
+        disks of the same writes are the same."""
         self.forward(moment.log, moment.end)
         subprocess.run(["cp", "--sparse=always", self.durable, disk], check=True)
-        kept = [entry for entry in self.in_cache if self.dice.random() < 0.5]
+        kept = [number for number in range(len(self.in_cache)) if self.dice.random() < 0.5]
         with disk.open("r+b") as file:
-            for entry in kept:
-                file.seek(entry.offset)
-                file.write(entry.data)
-        return len(self.in_cache), len(self.in_cache) - len(kept)
+            for number in kept:
+                file.seek(self.in_cache[number].offset)
+                file.write(self.in_cache[number].data)
+        return len(self.in_cache), len(self.in_cache) - len(kept), (self.flushed, *kept)

@@ -119,7 +119,7 @@ def wait_for(condition, timeout_s, what, still_there=lambda: True):
 # By architecture: QEMU, UEFI's code and its variables.
 MACHINES = {
     "amd64": (["qemu-system-x86_64", "-machine", "q35", *guest.accelerator()], "/usr/share/OVMF/OVMF_CODE_4M.fd", "/usr/share/OVMF/OVMF_VARS_4M.fd"),
-    "arm64": (["qemu-system-aarch64", "-machine", "virt", "-accel", "tcg,thread=multi", "-cpu", "cortex-a72"],
+    "arm64": (["qemu-system-aarch64", "-machine", "virt", "-accel", "tcg,thread=multi", "-cpu", "cortex-a72", "-device", "virtio-rng-pci"],
               "/usr/share/AAVMF/AAVMF_CODE.fd", "/usr/share/AAVMF/AAVMF_VARS.fd"),
 }
 
@@ -130,9 +130,10 @@ class Board:
     When the board restarts, QEMU ends and is started anew: after a warm reset OVMF takes minutes in emulation.
     """
 
-    def __init__(self, disk, console, memory="1G", recorded=False, architecture="amd64"):
+    def __init__(self, disk, console, memory="1G", recorded=False, architecture="amd64", processors=2):
         """`recorded`: what is written to the disk goes to `logs` too, one file a start (power_cut.py)."""
         self.disk, self.console, self.memory, self.recorded = disk, console, memory, recorded
+        self.processors = str(processors)
         self.logs = []
         self.variables = pathlib.Path(str(disk) + ".vars")
         self.control = pathlib.Path(tempfile.gettempdir()) / f"imprint-board-{os.getpid()}.qmp"  # its path must be short
@@ -151,7 +152,7 @@ class Board:
         return f"node-name=disk,driver=blklogwrites,file.{file.replace(',', ',file.')},log.driver=file,log.filename={log}"
 
     def launch(self, stick):
-        command = [*self.machine, "-smp", "2", "-m", self.memory,
+        command = [*self.machine, "-smp", self.processors, "-m", self.memory,
                    "-nographic", "-no-reboot", "-drive", f"if=pflash,format=raw,readonly=on,file={self.firmware}",
                    "-drive", f"if=pflash,format=raw,file={self.variables}",
                    "-blockdev", self.disk_option(), "-device", "virtio-blk-pci,drive=disk,bootindex=0", "-nic", "user,model=virtio-net-pci",

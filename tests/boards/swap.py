@@ -22,7 +22,7 @@ def new_board(work, folder):
     """A disk as it is flashed, of no camera yet."""
     options = folder / "board.cfg"
     options.write_text('set board_options=""\n')
-    make_disk.make_disk(folder / "disk.img", work / "root.squashfs", work, None, options, 512)
+    make_disk.make_disk(folder / "disk.img", work / "root.squashfs", folder, None, options, 512)
     console = folder / "console.log"
     console.unlink(missing_ok=True)
     return plant.Board(folder / "disk.img", console)

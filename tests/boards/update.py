@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """An amd64 image in QEMU under UEFI: it boots to a publishing node; an update goes to the other slot and is judged good; a
 stranger's bundle is refused; an image whose node does not run goes back by itself. The update is recorded for power_cut."""
+import fcntl
 import os
 import pathlib
 import re
@@ -26,7 +27,14 @@ import make_root
 
 
 def prepare(image):
-    """The image, and bundles of it: of another version, of a stranger, and one whose node does not run."""
+    """The image, and bundles of it: of another version, of a stranger, and one whose node does not run. One at a time."""
+    image.mkdir(parents=True, exist_ok=True)
+    with (image / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return make_variants(image)
+
+
+def make_variants(image):
     work = image / "work"
     made = work / "root/etc/imprint-version"
     if not (work / "root.squashfs").exists() or made.read_text().strip() != board_image.version_of_tree():
@@ -64,7 +72,7 @@ def make_board(line, work, folder, architecture="amd64", grub=pathlib.Path("/usr
     options = folder / "board.cfg"
     options.write_text(f'set board_options="imprint.patience_s={PATIENCE_S}"\n')
     disk = folder / "disk.img"
-    make_disk.make_disk(disk, work / "root.squashfs", work, line.board_folder("cam1", f"uefi-{architecture}"), options, 512,
+    make_disk.make_disk(disk, work / "root.squashfs", folder, line.board_folder("cam1", f"uefi-{architecture}"), options, 512,
                         architecture, grub)
     console = folder / "console.log"
     console.unlink(missing_ok=True)
