@@ -10,6 +10,7 @@
 
 #include "node/edge/body_brightness.h"
 #include "node/edge/edge_path.h"
+#include "node/edge/outside_level.h"
 #include "node/edge/scan_lines.h"
 #include "node/edge/step_edges.h"
 
@@ -155,6 +156,8 @@ std::optional<double> walk_to_end(const cv::Mat& image, const SilhouetteFrame& f
 
 LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const EndSearch& search, Polarity polarity,
                       const EdgeConfig& config) {
+  constexpr double kMostDip = 0.06, kMostBump = 0.18;  // of the step: beyond lies scale, colder or glowing faintly
+  constexpr double kLeastRows = 0.35;                  // that must have seen it: less may be any straight border nearby
   LocatedEnd end;
   end.station_px = search.station_px;
   end.offset_px = search.axis_offset_px;
@@ -182,13 +185,16 @@ LocatedEnd locate_end(const cv::Mat& image, const SilhouetteFrame& frame, const 
       read_scan_lines(image, requests, rows ? cv::Vec2d(sign, 0) : cv::Vec2d(0, sign), 1.0, polarity == Polarity::dark);
   std::vector<ArcPoint> points;
   const double radius_px = 0.5 * search.diameter_px;
-  for (const StepEdge& edge : fit_step_edges(scan, trace_rim(scan, true, config), config.blur_region_stations)) {
+  const std::vector<StepEdge> edges = fit_step_edges(scan, trace_rim(scan, true, config), config.blur_region_stations);
+  const std::vector<OutsideLevel> outside = outside_levels(scan, edges);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const StepEdge& edge = edges[i];
+    if (outside[i].dip > kMostDip || outside[i].bump > kMostBump) continue;
     const ObservedPoint p = scan.at(scan.lines[edge.line], edge.position_px);
     points.push_back({(frame.offset_px(p) - search.axis_offset_px) / radius_px, frame.station_px(p)});
   }
   const auto arc = consensus_arc(points, search.at_start ? -1.0 : 1.0);
-  // Half of the rows must have seen it: less may be any straight border near the end.
-  if (!arc || arc->count < reach) return end;
+  if (!arc || arc->count < kLeastRows * 2.0 * reach) return end;
   end.visible = true;
   end.station_px = arc->coefficients[0];
   // One independent point in five rows. Haze moves the end as a whole too, which no residual about the arc shows: by
